@@ -1,0 +1,54 @@
+#pragma once
+
+#include <array>
+#include <semaphore>
+#include <span>
+#include <vector>
+
+#include "drivers/frame_packet.h"
+#include "hil/camera_link.h"
+#include "hil/spsc_ring.h"
+
+namespace drivers {
+
+/// A cable without hardware: frames and commands cross it as the bytes of frame_packet.h, and
+/// nothing else does. The device's side is the lower half of the interface.
+///
+/// A device that reads slowly holds its slots; the camera's side then says kBusy after its timeout
+/// and goes on. Thread: sender for send(), receiver for receive(), one device thread for the rest.
+class MockLink final : public hil::FrameSink, public hil::CommandSource {
+ public:
+  MockLink(int width_px, int height_px);
+
+  engine::Status send(const hil::Frame& frame, engine::Duration timeout) noexcept override;
+  engine::Expected<hil::Command> receive(engine::Duration timeout) noexcept override;
+
+  /// The device's side. The bytes are the device's until it calls release_frame().
+  [[nodiscard]] engine::Expected<std::span<const std::byte>> next_frame(
+      engine::Duration timeout) noexcept;
+  void release_frame() noexcept;
+  /// kBusy when the camera has not taken the last 64 packets; kRejected for more than 256 bytes.
+  engine::Status reply(std::span<const std::byte> bytes) noexcept;
+
+ private:
+  static constexpr std::size_t kSlots = 3;
+  static constexpr std::size_t kLargestPacket = 256;
+  struct Slot {
+    std::vector<std::byte> bytes;
+    std::size_t used = 0;
+  };
+  struct Packet {
+    std::array<std::byte, kLargestPacket> bytes{};
+    std::size_t used = 0;
+  };
+
+  std::array<Slot, kSlots> slots_;
+  std::size_t next_to_fill_ = 0;  // the sender's own
+  std::size_t next_to_read_ = 0;  // the device's own
+  std::counting_semaphore<> empty_{kSlots};
+  std::counting_semaphore<> full_{0};
+  hil::SpscRing<Packet, 64> packets_;  // device -> receiver
+  std::counting_semaphore<> packet_count_{0};
+};
+
+}  // namespace drivers

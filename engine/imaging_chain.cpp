@@ -1,0 +1,78 @@
+#include "engine/imaging_chain.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace engine {
+
+ImagingChain::ImagingChain(const SnapshotBuilder& scene, std::unique_ptr<Renderer> renderer,
+                           Optics optics, const Detector& detector,
+                           const DetectorSpec& detector_spec, const CameraGeometry& camera,
+                           Stopwatch stopwatch)
+    : scene_(scene),
+      renderer_(std::move(renderer)),
+      optics_(std::move(optics)),
+      detector_(detector),
+      detector_spec_(detector_spec),
+      stopwatch_(stopwatch),
+      irradiance_(camera.width_px, camera.height_px),
+      electrons_(camera.width_px, camera.height_px) {
+  const GridWish wish = optics_.wish();
+  const PixelRect most = camera.frame().grown_by(wish.beyond_frame_px);
+  radiance_.grid.reserve(most.width() * wish.oversampling, most.height() * wish.oversampling);
+}
+
+FrameReport ImagingChain::expose(const Shot& shot, Budget budget, DnImage& out) noexcept {
+  FrameReport report;
+  const Duration start = now();
+  const Snapshot snapshot = scene_.build(shot);
+  const Duration built = now();
+  report.render = renderer_->render(snapshot, budget, radiance_);
+  const Duration rendered = now();
+  report.optics = optics_.project(radiance_, irradiance_);
+  const Duration projected = now();
+  detector_.expose(irradiance_, shot.exposure, snapshot.seed, shot.sequence, electrons_);
+  detector_.digitize(electrons_, snapshot.seed, shot.sequence, out);
+  report.times = {built - start, rendered - built, projected - rendered, now() - projected};
+
+  FrameTruth& truth = report.truth;
+  truth.range_m = snapshot.range_m;
+  truth.range_rate_m_s = snapshot.range_rate_m_s;
+  truth.line_of_sight_rate_rad_s = snapshot.line_of_sight_rate_rad_s;
+  truth.phase_angle_rad = snapshot.phase_angle_rad;
+  truth.target_px = snapshot.target_px;
+  truth.smear_px = std::hypot(snapshot.smear_px.u, snapshot.smear_px.v);
+  truth.sun_irradiance_w_m2 = snapshot.sun.irradiance_w_m2;
+  truth.earthshine_w_m2 = snapshot.earthshine.irradiance_w_m2;
+  truth.earth_behind = snapshot.earth_behind;
+  truth.roll_is_fallback = snapshot.roll_is_fallback;
+  measure_light(report.optics.window, shot.exposure, truth);
+  const auto pixels = out.pixels();
+  report.peak_dn = *std::max_element(pixels.begin(), pixels.end());
+  return report;
+}
+
+void ImagingChain::measure_light(const PixelRect& window, Duration exposure,
+                                 FrameTruth& truth) const noexcept {
+  const double background = radiance_.uniform_w_m2_sr * optics_.throughput_sr();
+  double sum = 0;
+  double sum_u = 0;
+  double sum_v = 0;
+  double peak = 0;
+  for (int v = window.top; v < window.bottom; ++v) {
+    const auto row = irradiance_.row(v);
+    for (int u = window.left; u < window.right; ++u) {
+      const double light = static_cast<double>(row[static_cast<std::size_t>(u)]) - background;
+      sum += light;
+      sum_u += light * u;
+      sum_v += light * v;
+      peak = std::max(peak, light);
+    }
+  }
+  const double to_e = detector_spec_.electrons_per_irradiance(exposure);
+  truth.peak_e = peak * to_e;
+  // Less than one electron in the whole frame is no target: rounding of the transform, at most.
+  if (sum * to_e > 1.0) truth.photocentre_px = {sum_u / sum, sum_v / sum};
+}
+
+}  // namespace engine

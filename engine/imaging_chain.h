@@ -1,0 +1,41 @@
+#pragma once
+
+#include <memory>
+
+#include "engine/detector/detector.h"
+#include "engine/optics/optics.h"
+#include "engine/scene/snapshot_builder.h"
+#include "engine/scene_generator.h"
+
+namespace engine {
+
+/// Radiance -> irradiance -> electrons -> DN.
+class ImagingChain final : public SceneGenerator {
+ public:
+  /// Reads a clock that only the report depends on.
+  using Stopwatch = Duration (*)() noexcept;
+
+  ImagingChain(const SnapshotBuilder& scene, std::unique_ptr<Renderer> renderer, Optics optics,
+               const Detector& detector, const DetectorSpec& detector_spec,
+               const CameraGeometry& camera, Stopwatch stopwatch = nullptr);
+
+  FrameReport expose(const Shot& shot, Budget budget, DnImage& out) noexcept override;
+
+ private:
+  [[nodiscard]] Duration now() const noexcept {
+    return stopwatch_ != nullptr ? stopwatch_() : Duration{};
+  }
+  void measure_light(const PixelRect& window, Duration exposure, FrameTruth& truth) const noexcept;
+
+  SnapshotBuilder scene_;
+  std::unique_ptr<Renderer> renderer_;
+  Optics optics_;
+  Detector detector_;
+  DetectorSpec detector_spec_;
+  Stopwatch stopwatch_;
+  Radiance radiance_;
+  IrradianceImage irradiance_;
+  ElectronImage electrons_;
+};
+
+}  // namespace engine

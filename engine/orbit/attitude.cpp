@@ -1,0 +1,61 @@
+#include "engine/orbit/attitude.h"
+
+#include <cmath>
+
+#include "engine/core/constants.h"
+
+namespace engine {
+namespace {
+
+using Eigen::AngleAxisd;
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+/// The paper's R_x, R_y, R_z turn the axes, so they are the transposes of the usual ones.
+Matrix3d axes_turned(double angle_rad, const Vector3d& axis) {
+  return AngleAxisd(-angle_rad, axis).toRotationMatrix();
+}
+
+}  // namespace
+
+EulerOffsets read_offsets(const ConfigTable& table) {
+  const Range turn = between(-180.0, 180.0);
+  return {table.number_or("pitch_deg", 0.0, turn) * kDegree,
+          table.number_or("roll_deg", 0.0, turn) * kDegree,
+          table.number_or("yaw_deg", 0.0, turn) * kDegree};
+}
+
+Rotation<OrbitalFrame, J2000> orbital_frame(const OrbitState& state) noexcept {
+  const Vector3d nadir = -state.position.m.normalized();
+  const Vector3d normal = state.position.m.cross(state.velocity.m_s).normalized();
+  Rotation<OrbitalFrame, J2000> frame;
+  frame.matrix.row(0) = (-normal).cross(nadir);
+  frame.matrix.row(1) = -normal;
+  frame.matrix.row(2) = nadir;
+  return frame;
+}
+
+Rotation<BodyFrame, OrbitalFrame> body_offset(const EulerOffsets& offsets) noexcept {
+  return {axes_turned(offsets.pitch_rad, Vector3d::UnitY()) *
+          axes_turned(offsets.roll_rad, Vector3d::UnitX()) *
+          axes_turned(offsets.yaw_rad, Vector3d::UnitZ())};
+}
+
+CameraAttitude look_along(const Direction<J2000>& boresight) noexcept {
+  constexpr double kPoleLimit = 1e-9;
+  const Vector3d& z = boresight.unit;
+  const double across = std::hypot(z.x(), z.y());
+  CameraAttitude attitude;
+  Vector3d y = Vector3d::UnitY();
+  if (across > kPoleLimit) {
+    y = Vector3d(-z.y(), z.x(), 0.0) / across;
+  } else {
+    attitude.roll_is_fallback = true;
+  }
+  attitude.axes.matrix.row(0) = y.cross(z).normalized();
+  attitude.axes.matrix.row(1) = y;
+  attitude.axes.matrix.row(2) = z;
+  return attitude;
+}
+
+}  // namespace engine

@@ -1,0 +1,164 @@
+#include "engine/render/embree_scene.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+#include <embree3/rtcore.h>
+
+namespace engine {
+namespace {
+
+constexpr float kLargestCoordinate_m = 1e6F;
+constexpr float kFar = std::numeric_limits<float>::infinity();
+constexpr unsigned kAllGeometry = ~0U;
+
+/// Finite, near, and a direction of about unit length. False for anything that is not a number.
+bool valid_ray(float ox, float oy, float oz, float dx, float dy, float dz) noexcept {
+  const float length2 = dx * dx + dy * dy + dz * dz;
+  return std::abs(ox) < kLargestCoordinate_m && std::abs(oy) < kLargestCoordinate_m &&
+         std::abs(oz) < kLargestCoordinate_m && length2 > 0.25F && length2 < 4.0F;
+}
+
+bool start_ray(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction, RTCRay& ray,
+               RayCounts& counts) noexcept {
+  if (!valid_ray(origin.x(), origin.y(), origin.z(), direction.x(), direction.y(), direction.z())) {
+    ++counts.rejected;
+    return false;
+  }
+  ++counts.rays;
+  ray = {};
+  ray.org_x = origin.x();
+  ray.org_y = origin.y();
+  ray.org_z = origin.z();
+  ray.dir_x = direction.x();
+  ray.dir_y = direction.y();
+  ray.dir_z = direction.z();
+  ray.tfar = kFar;
+  ray.mask = kAllGeometry;
+  return true;
+}
+
+using LaneMask = std::array<int, RayPacket::kLanes>;  // -1 traces a lane, 0 leaves it out
+
+void start_rays(const RayPacket& rays, RTCRay16& out, LaneMask& mask, RayCounts& counts) noexcept {
+  for (std::size_t i = 0; i < mask.size(); ++i) {
+    const bool valid =
+        rays.active[i] && valid_ray(rays.origin_x[i], rays.origin_y[i], rays.origin_z[i],
+                                    rays.direction_x[i], rays.direction_y[i], rays.direction_z[i]);
+    counts.rays += valid ? 1U : 0U;
+    counts.rejected += rays.active[i] && !valid ? 1U : 0U;
+    mask[i] = valid ? -1 : 0;
+    // Lanes that are left out still have to be numbers.
+    out.org_x[i] = valid ? rays.origin_x[i] : 0.0F;
+    out.org_y[i] = valid ? rays.origin_y[i] : 0.0F;
+    out.org_z[i] = valid ? rays.origin_z[i] : 0.0F;
+    out.dir_x[i] = valid ? rays.direction_x[i] : 0.0F;
+    out.dir_y[i] = valid ? rays.direction_y[i] : 0.0F;
+    out.dir_z[i] = valid ? rays.direction_z[i] : 1.0F;
+    out.tnear[i] = 0.0F;
+    out.tfar[i] = kFar;
+    out.time[i] = 0.0F;
+    out.mask[i] = kAllGeometry;
+    out.id[i] = 0;
+    out.flags[i] = 0;
+  }
+}
+
+RTCIntersectContext context_for(RTCIntersectContextFlags flags) noexcept {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  context.flags = flags;
+  return context;
+}
+
+}  // namespace
+
+struct EmbreeScene::Handles {
+  RTCDevice device = nullptr;
+  RTCScene scene = nullptr;
+  ~Handles() {
+    if (scene != nullptr) rtcReleaseScene(scene);
+    if (device != nullptr) rtcReleaseDevice(device);
+  }
+};
+
+EmbreeScene::EmbreeScene(const Mesh& mesh) : handles_(std::make_unique<Handles>()) {
+  // One building thread: the tree, and with it the bits, must not depend on the machine's load.
+  RTCDevice device = handles_->device = rtcNewDevice("threads=1");
+  if (device == nullptr) throw std::runtime_error("Embree: no device");
+  RTCScene scene = handles_->scene = rtcNewScene(device);
+  rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
+  rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_HIGH);
+  RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
+  auto* corners = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0,
+                                                              RTC_FORMAT_FLOAT3, 3 * sizeof(float),
+                                                              mesh.vertices.size()));
+  auto* indices = static_cast<unsigned*>(
+      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                              3 * sizeof(unsigned), mesh.triangles.size()));
+  if (corners == nullptr || indices == nullptr) throw std::runtime_error("Embree: out of memory");
+  for (const auto& v : mesh.vertices) {
+    for (const float coordinate : {v.x(), v.y(), v.z()}) *corners++ = coordinate;
+  }
+  for (const auto& t : mesh.triangles) {
+    for (const std::uint32_t corner : t.corner) *indices++ = corner;
+  }
+  rtcCommitGeometry(geometry);
+  rtcAttachGeometry(scene, geometry);
+  rtcReleaseGeometry(geometry);
+  rtcCommitScene(scene);
+  if (const RTCError error = rtcGetDeviceError(device); error != RTC_ERROR_NONE)
+    throw std::runtime_error("Embree: error " + std::to_string(error));
+}
+
+EmbreeScene::~EmbreeScene() = default;
+
+MeshHit EmbreeScene::intersect(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction,
+                               RayCounts& counts) const noexcept {
+  RTCRayHit query{};
+  if (!start_ray(origin, direction, query.ray, counts)) return {};
+  query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  RTCIntersectContext context = context_for(RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT);
+  rtcIntersect1(handles_->scene, &context, &query);
+  if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};
+  return {query.hit.primID, query.hit.u, query.hit.v};
+}
+
+bool EmbreeScene::occluded(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction,
+                           RayCounts& counts) const noexcept {
+  RTCRay ray;
+  if (!start_ray(origin, direction, ray, counts)) return false;
+  RTCIntersectContext context = context_for(RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT);
+  rtcOccluded1(handles_->scene, &context, &ray);
+  return ray.tfar < 0.0F;  // Embree sets it to -inf when something is in the way
+}
+
+void EmbreeScene::intersect(const RayPacket& rays, std::array<MeshHit, RayPacket::kLanes>& hits,
+                            RayCounts& counts) const noexcept {
+  RTCRayHit16 query;
+  alignas(64) LaneMask mask;
+  start_rays(rays, query.ray, mask, counts);
+  std::fill(std::begin(query.hit.geomID), std::end(query.hit.geomID), RTC_INVALID_GEOMETRY_ID);
+  RTCIntersectContext context = context_for(RTC_INTERSECT_CONTEXT_FLAG_COHERENT);
+  rtcIntersect16(mask.data(), handles_->scene, &context, &query);
+  for (std::size_t i = 0; i < hits.size(); ++i) {
+    const bool hit = mask[i] != 0 && query.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
+    hits[i] = hit ? MeshHit{query.hit.primID[i], query.hit.u[i], query.hit.v[i]} : MeshHit{};
+  }
+}
+
+void EmbreeScene::occluded(const RayPacket& rays, std::array<bool, RayPacket::kLanes>& blocked,
+                           RayCounts& counts) const noexcept {
+  RTCRay16 query;
+  alignas(64) LaneMask mask;
+  start_rays(rays, query, mask, counts);
+  RTCIntersectContext context = context_for(RTC_INTERSECT_CONTEXT_FLAG_COHERENT);
+  rtcOccluded16(mask.data(), handles_->scene, &context, &query);
+  for (std::size_t i = 0; i < blocked.size(); ++i)
+    blocked[i] = mask[i] != 0 && query.tfar[i] < 0.0F;
+}
+
+}  // namespace engine

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "engine/core/image.h"
+#include "engine/scene/snapshot.h"
+
+namespace engine {
+
+/// Something without a size on the detector.
+struct PointSource {
+  PixelPoint place;
+  double irradiance_w_m2 = 0;  ///< at the pupil, across the line of sight
+};
+
+/// Light arriving at the entrance pupil: a grid (its region and oversampling are the optics' wish),
+/// a list of point sources at exact sub-pixel places, and what is even over the field.
+/// A grid cell holds the mean radiance over its own area, oversampling^2 cells to a pixel; the
+/// cells of pixel (u, v) start at (oversampling * (u - region.left), ...).
+struct Radiance {
+  PixelRect region;  ///< may reach beyond the frame: light from there blurs in
+  int oversampling = 3;
+  RadianceImage grid;
+  std::vector<PointSource> points;  ///< inside the region
+  double uniform_w_m2_sr = 0;
+  PixelPoint motion_px;  ///< how the image moves from shutter open to shutter close
+};
+
+/// What the optics want to be given.
+struct GridWish {
+  int oversampling = 3;
+  int beyond_frame_px = 64;  ///< how far outside the frame light still matters
+};
+
+/// What a frame may cost. 0 leaves it to the renderer's own setting.
+struct Budget {
+  int samples_per_pixel = 0;
+};
+
+/// What was reached.
+struct RenderReport {
+  std::uint64_t samples = 0;  ///< through the cells where the target can be
+  std::uint64_t hits = 0;     ///< of these, on the target
+  std::uint64_t rays = 0;
+  std::uint64_t rejected_rays = 0;  ///< not finite or out of range: never given to the tracer
+  int samples_per_pixel = 0;
+  int bounces = 0;
+};
+
+/// Thread: loop; it owns its workers. Loop-safe: the scene is built in the constructor.
+class Renderer {
+ public:
+  virtual ~Renderer() = default;
+  /// Overwrites `out`. The report says what was reached.
+  virtual RenderReport render(const Snapshot& snapshot, Budget budget, Radiance& out) noexcept = 0;
+};
+
+}  // namespace engine

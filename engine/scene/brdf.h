@@ -1,0 +1,82 @@
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "engine/core/config_reader.h"
+#include "engine/core/random.h"
+#include "engine/core/vec.h"
+
+namespace engine {
+
+/// The five parameters of eq 7 of Li et al. 2023, table 3.
+struct FiveParameters {
+  double ar = 0.557;
+  double br = -261.6;
+  double kb = 15.42;
+  double kd = 0.047;
+  double kr = 0.717;
+};
+
+/// How a surface scatters light. All vectors are unit, in a frame whose z is the normal.
+///
+/// Five-parameter model, eq 7 of Li et al. 2023. We differ from the print:
+///  - alpha and gamma are exchanged: gamma = angle(n, h) and alpha = angle(i, h), h the half
+///  vector.
+///    As printed both of its materials send the light back to its source.
+///  - `physical` (default): the diffuse term is the constant kd, a Lambert surface of albedo pi kd,
+///    and the specular term is scaled, alike for both directions, so that the two together never
+///    send back more than came in. Reciprocal. The printed kd/cos_i passes albedo 1 at 76 deg.
+///  - `paper` keeps the printed terms, clamped so that the albedo stays 1 at most.
+/// A Lambert surface is kb = 0. Leaves out colour and polarisation.
+class Brdf {
+ public:
+  enum class Variant : std::uint8_t { kPhysical, kPaper };
+
+  Brdf(const FiveParameters& parameters, Variant variant);
+
+  /// 1/sr; 0 below the horizon. Finite everywhere.
+  [[nodiscard]] double eval(const Eigen::Vector3d& in, const Eigen::Vector3d& out) const noexcept;
+  /// Eq 7 with alpha and gamma exchanged and nothing else changed.
+  [[nodiscard]] double as_printed(const Eigen::Vector3d& in,
+                                  const Eigen::Vector3d& out) const noexcept;
+  /// The share of light from `cos_in` that goes anywhere at all.
+  [[nodiscard]] double albedo(double cos_in) const noexcept;
+
+  struct Sample {
+    Eigen::Vector3d in = Eigen::Vector3d::UnitZ();
+    double weight = 0;  ///< eval * cos_in / pdf; 0 ends the path
+  };
+  /// A direction from which light may come that leaves along `out`: mixture of cosine and lobe.
+  [[nodiscard]] Sample sample(const Eigen::Vector3d& out, Draws& draws) const noexcept;
+  /// Of `sample`, per steradian of `in`.
+  [[nodiscard]] double pdf(const Eigen::Vector3d& in, const Eigen::Vector3d& out) const noexcept;
+
+ private:
+  static constexpr int kAngles = 128;
+  static constexpr int kLobeCells = 512;
+
+  [[nodiscard]] double specular(const Eigen::Vector3d& in,
+                                const Eigen::Vector3d& out) const noexcept;
+  [[nodiscard]] double lobe(double one_minus_cos) const noexcept;
+  [[nodiscard]] double specular_limit(double cos_in) const noexcept;
+  [[nodiscard]] double specular_albedo(double cos_in) const noexcept;
+  [[nodiscard]] double lobe_share(const Eigen::Vector3d& out) const noexcept;
+  void tabulate_lobe();
+  void tabulate_albedo();
+
+  FiveParameters p_;
+  Variant variant_;
+  std::array<float, kLobeCells + 1> lobe_edges_{};  ///< of 1 - cos gamma; each cell equally likely
+  std::array<float, kAngles> specular_albedo_{};    ///< by the cosine: cell centres
+};
+
+struct Material {
+  std::string name;
+  Brdf brdf;
+};
+/// Reads materials.<name> for each name below `materials`.
+[[nodiscard]] std::vector<Material> read_materials(const ConfigReader& config);
+
+}  // namespace engine

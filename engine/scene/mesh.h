@@ -1,0 +1,41 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+namespace engine {
+
+/// Triangles of a target, in metres, in its body frame. Seen from outside a triangle runs
+/// anticlockwise, but shading is two-sided: open shells and flipped faces look right.
+struct Mesh {
+  struct Triangle {
+    std::array<std::uint32_t, 3> corner{};
+    std::uint32_t material = 0;  ///< index into material_names
+  };
+  std::vector<Eigen::Vector3f> vertices;
+  std::vector<Triangle> triangles;
+  std::vector<std::string> material_names;
+
+  /// The index of a material; a name that is not there yet is added.
+  [[nodiscard]] std::uint32_t material(const std::string& name);
+  /// Of the smallest sphere round the origin that holds every vertex, in metres.
+  [[nodiscard]] double bounding_radius_m() const noexcept;
+};
+
+/// What was left out of a file so that the rest could be used.
+struct MeshReport {
+  std::size_t not_finite = 0;  ///< faces with a corner that is not a number
+  std::size_t zero_area = 0;
+  [[nodiscard]] std::size_t left_out() const noexcept { return not_finite + zero_area; }
+};
+
+/// Reads an OBJ file: triangles, quads and polygons, its materials by name only.
+/// Throws ConfigError: no file, nothing in it, an index outside the file, over 10 million corners.
+[[nodiscard]] Mesh load_obj(const std::string& path, MeshReport& report);
+
+}  // namespace engine

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstdint>
+
+#include "engine/core/image.h"
+#include "engine/core/time.h"
+#include "engine/core/vec.h"
+#include "engine/orbit/attitude.h"
+
+namespace engine {
+
+/// The camera's attitude over an exposure: what smear and a rolling shutter integrate.
+struct AttitudeTrack {
+  CameraAttitude open;
+  CameraAttitude middle;
+  CameraAttitude close;
+};
+
+/// What the loop asks for: when, for how long, looking where.
+struct Shot {
+  std::uint64_t sequence = 0;
+  SimTime shutter_open{};
+  Duration exposure{};
+  AttitudeTrack attitude;
+};
+
+/// Parallel light that falls on the target.
+struct Lamp {
+  Direction<BodyFrame> toward;  ///< from the target to the lamp
+  double irradiance_w_m2 = 0;   ///< across the beam, in band
+};
+
+/// One exposure with its geometry resolved, at mid-exposure.
+struct Snapshot {
+  std::uint64_t sequence = 0;
+  std::uint64_t seed = 0;
+  SimTime shutter_open{};
+  Duration exposure{};
+
+  Position<BodyFrame> camera;                         ///< where the camera is, seen by the target
+  Rotation<BodyFrame, CameraFrame> body_from_camera;  ///< aberration already taken out
+  PixelPoint target_px;  ///< the image of the target's centre; far outside if behind the camera
+  PixelPoint smear_px;   ///< how that image moves from shutter open to shutter close
+  double range_m = 0;
+  double range_rate_m_s = 0;
+  double line_of_sight_rate_rad_s = 0;
+  double phase_angle_rad = 0;  ///< at the target, between Sun and camera
+
+  Lamp sun;                       ///< irradiance 0 in the Earth's shadow
+  Lamp earthshine;                ///< irradiance 0 when left out
+  double background_w_m2_sr = 0;  ///< even over the field
+  bool earth_behind = false;      ///< the field has the Earth in it, not only space
+  bool roll_is_fallback = false;
+};
+
+}  // namespace engine

@@ -1,0 +1,194 @@
+#include "hil/frame_loop.h"
+
+#include <algorithm>
+#include <thread>
+#include <utility>
+
+namespace hil {
+
+using engine::Duration;
+using engine::SimTime;
+
+namespace {
+
+constexpr Duration kPatience{50'000'000};  // how often a waiting thread looks for the stop
+constexpr Duration kLateLimit{1'000'000};
+constexpr std::size_t kMostWaiting = 256;
+
+}  // namespace
+
+FrameLoop::FrameLoop(const LoopSpec& spec, Clock& clock, PointingSource& pointing,
+                     engine::SceneGenerator& generator, FrameSink& sink, CommandSource& commands)
+    : spec_(spec),
+      clock_(clock),
+      pointing_(pointing),
+      generator_(generator),
+      sink_(sink),
+      source_(commands),
+      slots_(kSlots) {
+  ENSURE(spec.period > Duration{} && spec.exposure > Duration{});
+  ENSURE(spec.exposure + spec.command_lead <= spec.period);
+  waiting_.reserve(kMostWaiting);
+  for (std::size_t i = 0; i < kSlots; ++i) {
+    slots_[i].pixels.resize(spec.width_px, spec.height_px);
+    ENSURE(free_.push(i));
+  }
+  free_count_.release(kSlots);
+}
+
+LoopReport FrameLoop::run(const std::stop_token& stop) {
+  LoopReport report;
+  std::jthread sender([this](const std::stop_token& s) { send_frames(s); });
+  std::jthread receiver([this](const std::stop_token& s) { receive_commands(s); });
+  for (std::uint64_t k = 0; k < spec_.frames && !stop.stop_requested(); ++k) {
+    k = skip_missed(k, report);
+    if (k >= spec_.frames) break;
+    ++report.due;
+    obey(k, report);
+    FrameRecord record;
+    record.sequence = k;
+    record.shutter_open = opening(k);
+    record.skipped_before = std::exchange(skipped_before_, 0);
+    record.late = clock_.sleep_until(record.shutter_open);
+    if (record.late > kLateLimit) ++report.late;
+    std::size_t slot = 0;
+    record.handed_over = acquire_slot(stop, slot);
+    if (record.handed_over) {
+      expose(k, slot, record);
+    } else {
+      ++report.dropped;
+    }
+    if (!frames_.push(record)) ++report.records_lost;
+    if (record.handed_over && spec_.answer_timeout > Duration{} && !wait_for_answer(k, report)) {
+      report.answer_missing = true;
+      break;
+    }
+  }
+  sender.request_stop();
+  ready_count_.release();
+  sender.join();
+  receiver.request_stop();
+  receiver.join();
+  obey(spec_.frames, report);  // the answer to the last frame: for the record
+  report.sent = sender_counts_.sent;
+  report.faults = sender_counts_.faults;
+  report.last_fault = sender_counts_.last_fault;
+  report.command_faults = receiver_counts_.command_faults;
+  report.commands_lost += receiver_counts_.commands_lost;
+  return report;
+}
+
+/// The first frame from `k` on whose shutter can still open on time.
+std::uint64_t FrameLoop::skip_missed(std::uint64_t k, LoopReport& report) noexcept {
+  const Duration behind = clock_.now() - opening(k);
+  if (behind <= kLateLimit) return k;
+  const auto periods =
+      static_cast<std::uint64_t>((behind + spec_.period - Duration(1)) / spec_.period);
+  const std::uint64_t skipped = std::min(periods, spec_.frames - k);
+  report.due += skipped;
+  report.skipped += skipped;
+  skipped_before_ += skipped;
+  return k + skipped;
+}
+
+void FrameLoop::take_command(const Command& command, std::uint64_t k, LoopReport& report) noexcept {
+  pointing_.apply(command);
+  ++report.commands;
+  if (!applied_.push({k, command})) ++report.records_lost;
+}
+
+void FrameLoop::obey(std::uint64_t k, LoopReport& report) noexcept {
+  const SimTime slot = opening(k) - spec_.command_lead;
+  if (k < spec_.frames) {
+    static_cast<void>(clock_.sleep_until(slot));
+    // Up to here the commands before this slot hold.
+    static_cast<void>(pointing_.attitude(slot));
+  }
+  for (const Command& command : waiting_) take_command(command, k, report);
+  waiting_.clear();
+  for (Command command; received_.pop(command);) take_command(command, k, report);
+}
+
+bool FrameLoop::acquire_slot(const std::stop_token& stop, std::size_t& slot) noexcept {
+  if (spec_.when_busy == WhenBusy::kDropFrame) {
+    if (!free_count_.try_acquire()) return false;
+  } else {
+    while (!free_count_.try_acquire_for(kPatience))
+      if (stop.stop_requested()) return false;
+  }
+  ENSURE(free_.pop(slot));
+  return true;
+}
+
+void FrameLoop::expose(std::uint64_t k, std::size_t slot, FrameRecord& record) noexcept {
+  const SimTime open = record.shutter_open;
+  Slot& s = slots_[slot];
+  engine::Shot shot;
+  shot.sequence = k;
+  shot.shutter_open = open;
+  shot.exposure = spec_.exposure;
+  shot.attitude.open = pointing_.attitude(open);
+  shot.attitude.middle = pointing_.attitude(open + spec_.exposure / 2);
+  record.trim_rad = pointing_.trim_rad();
+  shot.attitude.close = pointing_.attitude(open + spec_.exposure);
+  record.report = generator_.expose(shot, engine::Budget{}, s.pixels);
+  s.frame = {k, open, spec_.exposure, spec_.bits, record.trim_rad, &s.pixels};
+  record.busy = std::max(Duration{}, clock_.now() - open - record.late);
+  ENSURE(ready_.push(slot));
+  ready_count_.release();
+}
+
+bool FrameLoop::wait_for_answer(std::uint64_t k, LoopReport& report) noexcept {
+  for (;;) {
+    if (!received_count_.try_acquire_for(spec_.answer_timeout)) return false;
+    Command command;
+    if (!received_.pop(command)) continue;
+    if (waiting_.size() < kMostWaiting) {
+      waiting_.push_back(command);
+    } else {
+      ++report.commands_lost;
+    }
+    if (command.answers_frame == k) return true;
+  }
+}
+
+void FrameLoop::send_frames(const std::stop_token& stop) noexcept {
+  // The stop comes with one count more: the ring is empty then, and only then.
+  for (;;) {
+    ready_count_.acquire();
+    std::size_t slot = 0;
+    if (!ready_.pop(slot)) {
+      if (stop.stop_requested()) return;
+      continue;
+    }
+    const engine::Status status = sink_.send(slots_[slot].frame, spec_.send_timeout);
+    if (status.ok()) {
+      ++sender_counts_.sent;
+    } else {
+      ++sender_counts_.faults;
+      sender_counts_.last_fault = status.error();
+    }
+    ENSURE(free_.push(slot));
+    free_count_.release();
+  }
+}
+
+void FrameLoop::receive_commands(const std::stop_token& stop) noexcept {
+  while (!stop.stop_requested()) {
+    const engine::Expected<Command> command = source_.receive(kPatience);
+    if (command.ok()) {
+      if (received_.push(command.value())) {
+        received_count_.release();
+      } else {
+        ++receiver_counts_.commands_lost;
+      }
+    } else if (command.error().fault == engine::Fault::kDisconnected) {
+      // Nobody is there: look again later, without eating a core.
+      std::this_thread::sleep_for(kPatience / 10);
+    } else if (command.error().fault != engine::Fault::kTimeout) {
+      ++receiver_counts_.command_faults;
+    }
+  }
+}
+
+}  // namespace hil

@@ -1,0 +1,131 @@
+#pragma once
+
+#include <semaphore>
+#include <stop_token>
+#include <vector>
+
+#include "engine/scene_generator.h"
+#include "hil/clock.h"
+#include "hil/pointing_source.h"
+#include "hil/spsc_ring.h"
+
+namespace hil {
+
+/// When the link still holds every slot: the rig must keep time, a rehearsal must keep every frame.
+enum class WhenBusy : std::uint8_t { kDropFrame, kWait };
+
+struct LoopSpec {
+  engine::SimTime start{};
+  engine::Duration period{100'000'000};
+  std::uint64_t frames = 1;
+  engine::Duration exposure{1'000'000};
+  /// Commands that are in by this long before a shutter opens (or by when a late loop gets there)
+  /// are obeyed from then on and show in that frame: the latency is one frame. Later ones wait for
+  /// the next slot.
+  engine::Duration command_lead{20'000'000};
+  WhenBusy when_busy = WhenBusy::kDropFrame;
+  /// Lockstep: the next frame waits this long for the answer to the last. Zero: it does not wait.
+  engine::Duration answer_timeout{};
+  engine::Duration send_timeout{50'000'000};
+  int width_px = 1024;
+  int height_px = 1024;
+  int bits = 11;
+};
+
+/// What became of one due frame.
+struct FrameRecord {
+  std::uint64_t sequence = 0;
+  engine::SimTime shutter_open{};
+  engine::Duration late{};  ///< of the wake-up
+  engine::Duration busy{};  ///< from the wake-up to the hand-over to the sender, by the clock
+  engine::FrameReport report;
+  TrimAngles trim_rad{};
+  std::uint64_t skipped_before = 0;  ///< periods lost before this frame, because we were too slow
+  bool handed_over = false;          ///< false: dropped, the link held every slot
+};
+
+/// A command, and the first frame it could show in. Together with the seed, all that a run depends
+/// on.
+struct CommandRecord {
+  std::uint64_t frame = 0;
+  Command command;
+};
+
+/// Counts that add up: due == sent + skipped + dropped + faults.
+struct LoopReport {
+  std::uint64_t due = 0;
+  std::uint64_t sent = 0;
+  std::uint64_t skipped = 0;         ///< whole periods that passed while we were still at work
+  std::uint64_t dropped = 0;         ///< the link still held every slot
+  std::uint64_t faults = 0;          ///< the link refused, timed out or was gone
+  std::uint64_t late = 0;            ///< exposed, but woken over a millisecond after the deadline
+  std::uint64_t commands = 0;        ///< obeyed
+  std::uint64_t command_faults = 0;  ///< packets that were none
+  std::uint64_t commands_lost = 0;   ///< came faster than a slot could take them
+  std::uint64_t records_lost = 0;    ///< the observer was too slow; the frame itself was not
+  bool answer_missing = false;       ///< lockstep ended because no answer came
+  engine::Error last_fault{};
+};
+
+/// Keeps time: one frame a period, through the generator to the sink, commands back into the
+/// pointing. Absolute deadlines; a period that is over is skipped and counted, never caught up.
+///
+/// Thread: run() is the loop; it starts a sender and a receiver. Observers pop `frames()` and
+/// `commands()` from one thread of their own.
+class FrameLoop {
+ public:
+  using FrameRing = SpscRing<FrameRecord, 256>;
+  using CommandRing = SpscRing<CommandRecord, 1024>;
+
+  /// Allocates everything the loop will ever need. May throw.
+  FrameLoop(const LoopSpec& spec, Clock& clock, PointingSource& pointing,
+            engine::SceneGenerator& generator, FrameSink& sink, CommandSource& commands);
+
+  LoopReport run(const std::stop_token& stop);
+
+  [[nodiscard]] FrameRing& frames() noexcept { return frames_; }
+  [[nodiscard]] CommandRing& commands() noexcept { return applied_; }
+
+ private:
+  static constexpr std::size_t kSlots = 4;
+  struct Slot {
+    Frame frame;
+    engine::DnImage pixels;
+  };
+
+  [[nodiscard]] engine::SimTime opening(std::uint64_t k) const noexcept {
+    return spec_.start + spec_.period * static_cast<std::int64_t>(k);
+  }
+  [[nodiscard]] std::uint64_t skip_missed(std::uint64_t k, LoopReport& report) noexcept;
+  [[nodiscard]] bool acquire_slot(const std::stop_token& stop, std::size_t& slot) noexcept;
+  void obey(std::uint64_t k, LoopReport& report) noexcept;
+  void expose(std::uint64_t k, std::size_t slot, FrameRecord& record) noexcept;
+  [[nodiscard]] bool wait_for_answer(std::uint64_t k, LoopReport& report) noexcept;
+  void take_command(const Command& command, std::uint64_t k, LoopReport& report) noexcept;
+  void send_frames(const std::stop_token& stop) noexcept;
+  void receive_commands(const std::stop_token& stop) noexcept;
+
+  LoopSpec spec_;
+  Clock& clock_;
+  PointingSource& pointing_;
+  engine::SceneGenerator& generator_;
+  FrameSink& sink_;
+  CommandSource& source_;
+  std::vector<Slot> slots_;
+
+  SpscRing<std::size_t, kSlots> ready_;  // loop -> sender
+  SpscRing<std::size_t, kSlots> free_;   // sender -> loop
+  SpscRing<Command, 256> received_;      // receiver -> loop
+  std::counting_semaphore<> ready_count_{0};
+  std::counting_semaphore<> free_count_{0};
+  std::counting_semaphore<> received_count_{0};
+
+  std::vector<Command> waiting_;  // taken, not yet obeyed; the loop's own
+  std::uint64_t skipped_before_ = 0;
+  LoopReport sender_counts_;    // the sender's own until it is joined
+  LoopReport receiver_counts_;  // the receiver's own until it is joined
+  FrameRing frames_;            // loop -> observer
+  CommandRing applied_;         // loop -> observer
+};
+
+}  // namespace hil

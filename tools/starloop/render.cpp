@@ -1,0 +1,76 @@
+#include <cstdio>
+#include <filesystem>
+
+#include "engine/core/constants.h"
+#include "engine/core/fits.h"
+#include "engine/orbit/utc.h"
+#include "tools/starloop/picture.h"
+#include "tools/starloop/subcommands.h"
+
+namespace starloop {
+namespace {
+
+std::vector<engine::FitsCard> header_of(const Scenario& s, const RenderOptions& options,
+                                        const engine::FrameReport& r) {
+  const engine::Epoch open = s.scene.epoch + engine::from_seconds(options.time_s);
+  const engine::FrameTruth& t = r.truth;
+  return {
+      {"ORIGIN", "Starloop", "program that made this frame"},
+      {"OBJECT", s.mesh, "target"},
+      {"SCENARIO", s.name, "scenario"},
+      {"DATE-OBS", engine::utc_text(open), "shutter opens, UTC"},
+      {"TIME", options.time_s, "[s] shutter opens, after the scenario's epoch"},
+      {"EXPTIME", engine::seconds(s.run.exposure), "[s] exposure"},
+      {"SEED", static_cast<long long>(s.scene.seed), "of all random numbers"},
+      {"BUNIT", "DN", "digital numbers"},
+      {"GAIN", s.detector.gain_e_dn(), "[e-/DN]"},
+      {"SATURATE", static_cast<long long>(s.detector.largest_dn()), "[DN] largest value"},
+      {"RANGE", t.range_m, "[m] camera to target"},
+      {"LOSRATE", t.line_of_sight_rate_rad_s, "[rad/s] of the line of sight"},
+      {"PHASE", t.phase_angle_rad / engine::kDegree, "[deg] Sun, target, camera"},
+      {"SUNIRR", t.sun_irradiance_w_m2, "[W/m2] 450-850 nm, at the target"},
+      {"EARTHIRR", t.earthshine_w_m2, "[W/m2] vector irradiance of the Earth"},
+      {"EARTHBG", static_cast<long long>(t.earth_behind), "1: the Earth is behind (not drawn)"},
+      {"TARGETU", t.target_px.u, "[px] image of the target's centre, from 0"},
+      {"TARGETV", t.target_px.v, "[px] image of the target's centre, from 0"},
+      {"SMEAR", t.smear_px, "[px] over the exposure"},
+      {"PEAKE", t.peak_e, "[e-] brightest pixel of the target, no noise"},
+      {"SAMPLES", static_cast<long long>(r.render.samples_per_pixel), "per pixel"},
+      {"BOUNCES", static_cast<long long>(r.render.bounces), "indirect"},
+      {"WINGPX", static_cast<long long>(r.optics.wing_px),
+       "[px] how far light's spread is followed"},
+  };
+}
+
+}  // namespace
+
+int render_frame(const CommonOptions& options, const RenderOptions& render) {
+  const Scenario scenario = load_scenario(options);
+  Rig rig(scenario, options.threads);
+  hil::ScriptedPointing pointing = rig.prediction();
+  engine::Shot shot;
+  shot.shutter_open = engine::sim_time(render.time_s);
+  shot.exposure = scenario.run.exposure;
+  shot.attitude = {pointing.attitude(shot.shutter_open),
+                   pointing.attitude(shot.shutter_open + shot.exposure / 2),
+                   pointing.attitude(shot.shutter_open + shot.exposure)};
+  engine::DnImage frame(scenario.scene.camera.width_px, scenario.scene.camera.height_px);
+  const engine::FrameReport report = rig.chain().expose(shot, engine::Budget{}, frame);
+
+  const std::filesystem::path fits(render.out);
+  const std::string png = std::filesystem::path(fits).replace_extension(".png").string();
+  engine::write_fits(fits.string(), frame, header_of(scenario, render, report));
+  write_png(png, frame, scenario.detector.bits);
+  if (!options.quiet) {
+    const engine::FrameTruth& t = report.truth;
+    std::printf("%s, %s: range %.3f km, phase %.1f deg, peak %.0f e- = %d DN%s\n",
+                fits.string().c_str(), png.c_str(), t.range_m * 1e-3,
+                t.phase_angle_rad / engine::kDegree, t.peak_e, report.peak_dn,
+                t.sun_irradiance_w_m2 > 0.0 ? "" : ", in the Earth's shadow");
+    if (t.earth_behind)
+      std::printf("The Earth is behind the target here; its light is not drawn yet.\n");
+  }
+  return kGood;
+}
+
+}  // namespace starloop

@@ -1,0 +1,214 @@
+#include "tools/starloop/run_folder.h"
+
+#include <cmath>
+#include <cstdio>
+#include <ctime>
+#include <map>
+#include <memory>
+#include <stdexcept>
+
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "engine/core/constants.h"
+#include "tools/starloop/picture.h"
+
+namespace starloop {
+
+namespace fs = std::filesystem;
+using engine::seconds;
+
+PngRecorder::PngRecorder(fs::path folder, std::uint64_t every, int width_px, int height_px)
+    : folder_(std::move(folder)), every_(every) {
+  for (std::size_t i = 0; i < kSlots; ++i) {
+    slots_[i].pixels.resize(width_px, height_px);
+    ENSURE(free_.push(i));
+  }
+  writer_ = std::jthread([this] { write_pictures(); });
+}
+
+PngRecorder::~PngRecorder() { finish(); }
+
+void PngRecorder::finish() {
+  if (!writer_.joinable()) return;
+  done_ = true;
+  ready_count_.release();
+  writer_.join();
+}
+
+engine::Status PngRecorder::send(const hil::Frame& frame, engine::Duration /*timeout*/) noexcept {
+  if (frame.sequence % every_ != 0) return engine::Done{};
+  std::size_t i = 0;
+  if (!free_.pop(i)) {
+    ++left_out_;
+    return engine::Error{engine::Fault::kBusy, 0, "recorder"};
+  }
+  Slot& slot = slots_[i];
+  const auto pixels = frame.pixels->pixels();
+  ENSURE(pixels.size() == slot.pixels.pixels().size());
+  std::copy(pixels.begin(), pixels.end(), slot.pixels.pixels().begin());
+  slot.sequence = frame.sequence;
+  slot.bits = frame.bits;
+  ENSURE(ready_.push(i));
+  ready_count_.release();
+  return engine::Done{};
+}
+
+void PngRecorder::write_pictures() noexcept {
+  for (;;) {
+    ready_count_.acquire();
+    std::size_t i = 0;
+    if (!ready_.pop(i)) {
+      if (done_) return;
+      continue;
+    }
+    const Slot& slot = slots_[i];
+    char name[40];
+    std::snprintf(name, sizeof name, "frame_%06llu.png",
+                  static_cast<unsigned long long>(slot.sequence));
+    try {
+      write_png((folder_ / name).string(), slot.pixels, slot.bits);
+      ++written_;
+    } catch (const std::exception& e) {
+      std::fprintf(stderr, "starloop: %s\n", e.what());
+    }
+    ENSURE(free_.push(i));
+  }
+}
+
+PointingScore score_pointing(const Scenario& scenario, const RunLog& log, double after_s) {
+  const engine::PixelPoint boresight = scenario.scene.camera.principal_point();
+  const engine::PixelRect frame = scenario.scene.camera.frame();
+  PointingScore score;
+  double sum2 = 0;
+  for (const hil::FrameRecord& r : log.frames) {
+    if (!r.handed_over) continue;
+    const double since_s = seconds(r.shutter_open - log.frames.front().shutter_open);
+    const engine::FrameTruth& t = r.report.truth;
+    const bool inside = t.target_px.u > frame.left - 0.5 && t.target_px.u < frame.right - 0.5 &&
+                        t.target_px.v > frame.top - 0.5 && t.target_px.v < frame.bottom - 0.5;
+    if (!inside && !score.lost_after_s) score.lost_after_s = since_s;
+    if (since_s < after_s) continue;
+    const double error =
+        std::hypot(t.photocentre_px.u - boresight.u, t.photocentre_px.v - boresight.v);
+    if (std::isnan(error)) {
+      ++score.without_target;
+      continue;
+    }
+    sum2 += error * error;
+    score.worst_px = std::max(score.worst_px, error);
+    ++score.frames;
+  }
+  if (score.frames > 0) score.rms_px = std::sqrt(sum2 / static_cast<double>(score.frames));
+  return score;
+}
+
+fs::path make_run_folder(const std::string& out, const std::string& scenario) {
+  const std::time_t now = std::time(nullptr);
+  std::tm utc{};
+  gmtime_r(&now, &utc);
+  char stamp[32];
+  std::strftime(stamp, sizeof stamp, "%Y-%m-%dT%H-%M-%SZ", &utc);
+  std::error_code error;
+  fs::path folder = fs::path(out) / scenario / stamp;
+  // Two runs in one second get a folder each.
+  for (int n = 2; fs::exists(folder, error); ++n)
+    folder = fs::path(out) / scenario / (std::string(stamp) + "_" + std::to_string(n));
+  fs::create_directories(folder, error);
+  if (error) throw std::runtime_error(folder.string() + ": " + error.message());
+  const fs::path link = fs::path(out) / "latest";
+  fs::remove(link, error);
+  fs::create_directory_symlink(fs::path(scenario) / folder.filename(), link, error);
+  return folder;
+}
+
+namespace {
+
+using File = std::unique_ptr<std::FILE, int (*)(std::FILE*)>;
+
+File open_table(const fs::path& path) {
+  File file(std::fopen(path.c_str(), "w"), &std::fclose);
+  if (!file) throw std::runtime_error(path.string() + ": cannot be written");
+  return file;
+}
+
+double ms(engine::Duration d) { return seconds(d) * 1e3; }
+
+void write_commands(const fs::path& folder, const RunLog& log) {
+  const File file = open_table(folder / "commands.csv");
+  std::fprintf(file.get(),
+               "frame,sequence,answers_frame,kind,trim_x_rad,trim_y_rad,trim_rate_x_rad_s,"
+               "trim_rate_y_rad_s,reference_ns,centroid_u_px,centroid_v_px,confidence\n");
+  for (const hil::CommandRecord& r : log.commands) {
+    const hil::Command& c = r.command;
+    std::fprintf(
+        file.get(), "%llu,%llu,%llu,%s,%.17g,%.17g,%.17g,%.17g,%lld,%.9g,%.9g,%.9g\n",
+        static_cast<unsigned long long>(r.frame), static_cast<unsigned long long>(c.sequence),
+        static_cast<unsigned long long>(c.answers_frame),
+        c.kind == hil::CommandKind::kTrim ? "trim" : "report", c.trim_offset_rad[0],
+        c.trim_offset_rad[1], c.trim_rate_rad_s[0], c.trim_rate_rad_s[1],
+        static_cast<long long>(c.reference.time_since_epoch().count()), c.detection.centroid_px.u,
+        c.detection.centroid_px.v, static_cast<double>(c.detection.confidence));
+  }
+}
+
+}  // namespace
+
+void write_tables(const fs::path& folder, const Scenario& scenario, const RunLog& log) {
+  write_commands(folder, log);
+  std::map<std::uint64_t, hil::Detection> seen;  // by the frame it was seen in
+  for (const hil::CommandRecord& r : log.commands)
+    if (r.command.detection.confidence > 0.0F) seen[r.command.answers_frame] = r.command.detection;
+
+  const engine::PixelPoint boresight = scenario.scene.camera.principal_point();
+  const File file = open_table(folder / "frames.csv");
+  std::fprintf(
+      file.get(),
+      "frame,time_s,range_km,range_rate_km_s,los_rate_rad_s,phase_deg,earth_behind,"
+      "target_u_px,target_v_px,photocentre_u_px,photocentre_v_px,tracker_u_px,tracker_v_px,"
+      "error_u_px,error_v_px,trim_x_urad,trim_y_urad,smear_px,peak_e,peak_dn,"
+      "geometry_ms,render_ms,optics_ms,detector_ms,busy_ms,late_ms,"
+      "samples,hits,rays,rejected_rays,wing_px,skipped_before,handed_over\n");
+  for (const hil::FrameRecord& r : log.frames) {
+    const engine::FrameReport& p = r.report;
+    const engine::FrameTruth& t = p.truth;
+    const auto it = seen.find(r.sequence);
+    const double nan = std::nan("");
+    const engine::PixelPoint tracked =
+        it != seen.end() ? it->second.centroid_px : engine::PixelPoint{nan, nan};
+    std::fprintf(file.get(), "%llu,%.9f,%.6f,%.6f,%.9f,%.4f,%d,",
+                 static_cast<unsigned long long>(r.sequence), seconds(r.shutter_open),
+                 t.range_m * 1e-3, t.range_rate_m_s * 1e-3, t.line_of_sight_rate_rad_s,
+                 t.phase_angle_rad / engine::kDegree, t.earth_behind ? 1 : 0);
+    std::fprintf(file.get(), "%.4f,%.4f,%.4f,%.4f,%.4f,%.4f,%.4f,%.4f,%.4f,%.4f,%.4f,%.1f,%d,",
+                 t.target_px.u, t.target_px.v, t.photocentre_px.u, t.photocentre_px.v, tracked.u,
+                 tracked.v, t.photocentre_px.u - boresight.u, t.photocentre_px.v - boresight.v,
+                 r.trim_rad[0] * 1e6, r.trim_rad[1] * 1e6, t.smear_px, t.peak_e, p.peak_dn);
+    std::fprintf(file.get(), "%.3f,%.3f,%.3f,%.3f,%.3f,%.3f,%llu,%llu,%llu,%llu,%d,%llu,%d\n",
+                 ms(p.times.geometry), ms(p.times.render), ms(p.times.optics), ms(p.times.detector),
+                 ms(r.busy), ms(r.late), static_cast<unsigned long long>(p.render.samples),
+                 static_cast<unsigned long long>(p.render.hits),
+                 static_cast<unsigned long long>(p.render.rays),
+                 static_cast<unsigned long long>(p.render.rejected_rays), p.optics.wing_px,
+                 static_cast<unsigned long long>(r.skipped_before), r.handed_over ? 1 : 0);
+  }
+}
+
+bool draw_pictures(const fs::path& folder, const std::string& compare) {
+  // Debian's own python3 is the one that has python3-matplotlib.
+  std::string python = "/usr/bin/python3";
+  std::string script = std::string(STARLOOP_SOURCE_DIR) + "/tools/plot/run_report.py";
+  std::string where = folder.string();
+  std::string other = compare;
+  char* arguments[] = {python.data(), script.data(), where.data(),
+                       other.empty() ? nullptr : other.data(), nullptr};
+  pid_t child = 0;
+  if (posix_spawn(&child, python.c_str(), nullptr, nullptr, arguments, environ) != 0) return false;
+  int status = 0;
+  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+  return WIFEXITED(status) && WEXITSTATUS(status) == 0;
+}
+
+}  // namespace starloop

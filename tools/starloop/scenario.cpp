@@ -1,0 +1,162 @@
+#include "tools/starloop/scenario.h"
+
+#include <algorithm>
+#include <thread>
+
+#include "engine/orbit/utc.h"
+#include "engine/scene/telescope.h"
+#include "hil/steady_clock.h"
+
+namespace starloop {
+namespace {
+
+using engine::ConfigReader;
+using engine::ConfigTable;
+using engine::Duration;
+using engine::from_seconds;
+
+// A wing of light is followed to where it is this share of the noise of a dark pixel: the default
+// profile's limit for all model errors together.
+constexpr double kUnseenShareOfNoise = 0.3;
+
+engine::Epoch read_epoch(const ConfigTable& table) {
+  const std::string text = table.text("epoch");
+  const auto epoch = engine::epoch_from_utc(text);
+  if (!epoch)
+    table.fail("epoch",
+               "must be a UTC date like 2022-01-01T00:00:00, from 1972 on, got \"" + text + "\"");
+  return *epoch;
+}
+
+RunSpec read_run(const ConfigTable& table) {
+  RunSpec run;
+  run.pass = static_cast<std::size_t>(table.integer("pass", engine::at_least(1.0)));
+  run.duration_s = table.number_or("duration_s", 0.0, engine::at_least(0.0));
+  run.exposure = from_seconds(table.number("exposure_ms", engine::between(1e-3, 1e5)) * 1e-3);
+  run.period = from_seconds(1.0 / table.number("frame_rate_hz", engine::between(0.01, 1000.0)));
+  run.command_lead =
+      from_seconds(table.number_or("command_lead_ms", 20.0, engine::between(0.0, 1e5)) * 1e-3);
+  run.answer_timeout =
+      from_seconds(table.number_or("answer_timeout_s", 10.0, engine::between(0.1, 3600.0)));
+  run.clock = table.choice_or<ClockMode>(
+      "clock", "realtime",
+      {{"realtime", ClockMode::kRealtime}, {"lockstep", ClockMode::kLockstep}});
+  run.record_every =
+      static_cast<std::uint64_t>(table.integer_or("record_every", 10, engine::at_least(1.0)));
+  if (run.exposure + run.command_lead > run.period) {
+    table.fail("exposure_ms", "and command_lead_ms must fit into one period of " +
+                                  std::to_string(engine::seconds(run.period) * 1e3) + " ms");
+  }
+  return run;
+}
+
+tracker::TrackerSpec read_tracker(const ConfigTable& table, const engine::CameraGeometry& camera,
+                                  Duration period) {
+  tracker::TrackerSpec spec;
+  spec.ifov_rad = camera.ifov_rad();
+  spec.frame_period_s = engine::seconds(period);
+  spec.threshold_sigma =
+      table.number_or("threshold_sigma", spec.threshold_sigma, engine::positive());
+  spec.alpha = table.number_or("alpha", spec.alpha, engine::between(0.0, 1.0));
+  spec.beta = table.number_or("beta", spec.beta, engine::between(0.0, 2.0));
+  return spec;
+}
+
+engine::Mesh load_mesh(const std::string& mesh) {
+  if (mesh == "telescope") return engine::telescope_mesh();
+  engine::MeshReport report;
+  return engine::load_obj(mesh, report);
+}
+
+int worker_threads(int wanted) {
+  if (wanted > 0) return wanted;
+  return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+}
+
+}  // namespace
+
+Scenario read_scenario(const ConfigReader& config) {
+  Scenario s;
+  const ConfigTable scenario = config.table("scenario");
+  s.name = scenario.text("name");
+  if (s.name.empty() || s.name.find_first_of("/\\") != std::string::npos || s.name[0] == '.')
+    scenario.fail("name", "must be usable as a folder's name, got \"" + s.name + "\"");
+  s.scene.epoch = read_epoch(scenario);
+  s.scene.seed = static_cast<std::uint64_t>(scenario.integer_or("seed", 1, engine::at_least(0.0)));
+  s.scene.light_path = scenario.choice_or<engine::LightPath>(
+      "light_path", "apparent",
+      {{"apparent", engine::LightPath::kApparent}, {"geometric", engine::LightPath::kGeometric}});
+  s.run = read_run(config.table("run"));
+  const ConfigTable criteria = config.table("criteria");
+  s.criteria = {criteria.number_or("pointing_rms_px", 0.0, engine::at_least(0.0)),
+                criteria.number_or("after_s", 0.0, engine::at_least(0.0))};
+  s.camera_orbit = engine::read_elements(config.table("orbit.camera"));
+  s.target_orbit = engine::read_elements(config.table("orbit.target"));
+
+  s.scene.camera = engine::read_camera_geometry(config.table("camera"));
+  s.scene.sun = engine::read_sun(config.table("sun"));
+  s.scene.earth = engine::read_earth(config.table("earth"));
+  s.scene.target_offsets = engine::read_offsets(config.table("target"));
+  s.scene.sky_w_m2_sr =
+      config.table("sky").number_or("radiance_w_m2_sr", 0.0, engine::at_least(0.0));
+  const ConfigTable visibility = config.table("visibility");
+  s.visibility = engine::read_visibility(visibility, s.scene.sun.model,
+                                         s.scene.camera.half_diagonal_field_rad());
+  s.search_span = from_seconds(
+      visibility.number_or("span_days", 15.0, engine::between(0.001, 1000.0)) * 86400.0);
+
+  s.mesh = config.table("target").text_or("mesh", "telescope");
+  s.materials = engine::read_materials(config);
+  s.optics = engine::read_optics(config.table("optics"), s.scene.camera);
+  s.render = engine::read_render(config.table("render"));
+  s.render.camera = s.scene.camera;
+  s.detector = engine::read_detector(config.table("detector"), s.scene.camera.pixel_pitch_m,
+                                     s.scene.sun.mean_wavelength_m);
+  s.guidance = hil::read_guidance_error(config.table("guidance"));
+  s.actuator = hil::read_actuator(config.table("actuator"));
+  s.tracker = read_tracker(config.table("tracker"), s.scene.camera, s.run.period);
+  config.reject_unknown_keys();
+  return s;
+}
+
+Scenario load_scenario(const CommonOptions& options) {
+  ConfigReader config = ConfigReader::from_file(options.file);
+  for (const std::string& assignment : options.overrides) config.set(assignment);
+  if (options.seed_given) config.set("scenario.seed=" + std::to_string(options.seed));
+  return read_scenario(config);
+}
+
+Rig::Rig(const Scenario& scenario, int threads)
+    : epoch_(scenario.scene.epoch),
+      path_(scenario.scene.light_path),
+      camera_(scenario.camera_orbit, epoch_),
+      target_(scenario.target_orbit, epoch_),
+      pool_(worker_threads(threads)) {
+  const engine::DetectorSpec& detector = scenario.detector;
+  const double dark_e = detector.dark_e_s * engine::seconds(scenario.run.exposure);
+  const double faint_w_m2 = kUnseenShareOfNoise * detector.noise_e(dark_e) /
+                            detector.electrons_per_irradiance(scenario.run.exposure);
+  engine::Optics optics(scenario.optics, faint_w_m2, pool_);
+  engine::RenderSpec render = scenario.render;
+  render.grid = optics.wish();
+  engine::Mesh mesh = load_mesh(scenario.mesh);
+  triangles_ = mesh.triangles.size();
+  auto tracer =
+      std::make_unique<engine::PathTracer>(render, std::move(mesh), scenario.materials, pool_);
+  chain_ = std::make_unique<engine::ImagingChain>(
+      engine::SnapshotBuilder(scenario.scene, camera_, target_), std::move(tracer),
+      std::move(optics), engine::Detector(detector, pool_), detector, scenario.scene.camera,
+      &hil::SteadyClock::stopwatch);
+}
+
+hil::ScriptedPointing Rig::prediction() const { return {camera_, target_, epoch_, path_}; }
+
+std::vector<engine::Pass> passes_of(const Scenario& scenario) {
+  const engine::Epoch epoch = scenario.scene.epoch;
+  const engine::KeplerPropagator camera(scenario.camera_orbit, epoch);
+  const engine::KeplerPropagator target(scenario.target_orbit, epoch);
+  return engine::find_passes(camera, target, scenario.visibility, epoch, engine::SimTime{},
+                             engine::SimTime{scenario.search_span});
+}
+
+}  // namespace starloop

@@ -1,0 +1,95 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "engine/imaging_chain.h"
+#include "engine/orbit/kepler.h"
+#include "engine/orbit/visibility.h"
+#include "engine/render/path_tracer.h"
+#include "engine/scene/brdf.h"
+#include "hil/closed_loop_pointing.h"
+#include "hil/frame_loop.h"
+#include "tools/tracker/tracker.h"
+
+namespace starloop {
+
+enum class ClockMode : std::uint8_t { kRealtime, kLockstep };
+
+/// How a run goes: when, how fast, what is kept.
+struct RunSpec {
+  std::size_t pass = 1;   ///< counted from 1
+  double duration_s = 0;  ///< 0: the whole pass
+  engine::Duration exposure{};
+  engine::Duration period{};
+  engine::Duration command_lead{};
+  engine::Duration answer_timeout{};
+  ClockMode clock = ClockMode::kRealtime;
+  std::uint64_t record_every = 10;
+};
+
+struct Criteria {
+  double pointing_rms_px = 0;  ///< 0: none
+  double after_s = 0;
+};
+
+/// All Specs of a run, as the rooms have read and checked them.
+struct Scenario {
+  std::string name;
+  RunSpec run;
+  Criteria criteria;
+  engine::KeplerElements camera_orbit;
+  engine::KeplerElements target_orbit;
+  engine::VisibilitySpec visibility;
+  engine::Duration search_span{};
+  engine::SceneSpec scene;
+  std::string mesh;
+  std::vector<engine::Material> materials;
+  engine::RenderSpec render;
+  engine::OpticsSpec optics;
+  engine::DetectorSpec detector;
+  hil::GuidanceError guidance;
+  hil::ActuatorSpec actuator;
+  tracker::TrackerSpec tracker;
+};
+
+/// What the command line says about every subcommand.
+struct CommonOptions {
+  std::string file;
+  std::vector<std::string> overrides;  ///< table.key=value
+  int threads = 0;                     ///< 0: one for each processor
+  bool quiet = false;
+  bool seed_given = false;
+  std::uint64_t seed = 0;
+};
+
+/// Throws engine::ConfigError.
+[[nodiscard]] Scenario load_scenario(const CommonOptions& options);
+[[nodiscard]] Scenario read_scenario(const engine::ConfigReader& config);
+
+/// Everything that is built from a scenario once, before the first shutter opens.
+class Rig {
+ public:
+  Rig(const Scenario& scenario, int threads);
+
+  [[nodiscard]] engine::ImagingChain& chain() noexcept { return *chain_; }
+  [[nodiscard]] hil::ScriptedPointing prediction() const;
+  [[nodiscard]] const engine::KeplerPropagator& camera() const noexcept { return camera_; }
+  [[nodiscard]] const engine::KeplerPropagator& target() const noexcept { return target_; }
+  [[nodiscard]] int threads() const noexcept { return pool_.threads(); }
+  [[nodiscard]] std::size_t triangles() const noexcept { return triangles_; }
+
+ private:
+  engine::Epoch epoch_;
+  engine::LightPath path_;
+  engine::KeplerPropagator camera_;
+  engine::KeplerPropagator target_;
+  engine::WorkerPool pool_;
+  std::size_t triangles_ = 0;
+  std::unique_ptr<engine::ImagingChain> chain_;
+};
+
+[[nodiscard]] std::vector<engine::Pass> passes_of(const Scenario& scenario);
+
+}  // namespace starloop

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <string>
+
+#include "tools/starloop/scenario.h"
+
+namespace starloop {
+
+/// What the shell is told.
+enum ExitCode : int { kGood = 0, kCriterionFailed = 1, kBadInput = 2, kDeviceFault = 3 };
+
+/// Lists the passes of a scenario.
+int list_passes(const CommonOptions& options, bool as_json);
+
+struct RenderOptions {
+  double time_s = 0;
+  std::string out = "frame.fits";
+};
+/// Writes one frame as FITS and PNG, the camera looking at the target.
+int render_frame(const CommonOptions& options, const RenderOptions& render);
+
+struct RunOptions {
+  bool open_loop = false;
+  std::string out = "out";
+  std::string compare;  ///< the folder of another run, for the plot
+};
+/// Runs a pass as a loop.
+int run_pass(const CommonOptions& options, const RunOptions& run);
+
+}  // namespace starloop
