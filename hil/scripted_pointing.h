@@ -6,17 +6,27 @@
 
 namespace hil {
 
+/// What the camera's roll is held to: the image's x grows away from it.
+enum class RollRule : std::uint8_t {
+  kCelestial,  ///< the Earth's axis: eq 8 of Li et al. 2023; turns fast where the line passes a
+               ///< pole
+  kVertical,   ///< the local vertical: x grows towards the Earth
+};
+
 /// Follows the predicted apparent line of sight to the target, and obeys nobody.
 class ScriptedPointing final : public PointingSource {
  public:
   /// The propagators outlive it.
   ScriptedPointing(const engine::Propagator& camera, const engine::Propagator& target,
-                   engine::Epoch epoch, engine::LightPath path)
-      : camera_(camera), target_(target), epoch_(epoch), path_(path) {}
+                   engine::Epoch epoch, engine::LightPath path, RollRule roll)
+      : camera_(camera), target_(target), epoch_(epoch), path_(path), roll_(roll) {}
 
   [[nodiscard]] engine::CameraAttitude attitude(engine::SimTime t) noexcept override {
     const engine::Epoch now = epoch_ + t.time_since_epoch();
-    return engine::look_along(engine::sight_line(camera_, target_, now, path_).apparent);
+    const engine::SightLine line = engine::sight_line(camera_, target_, now, path_);
+    if (roll_ == RollRule::kCelestial) return engine::look_along(line.apparent);
+    return engine::look_along(line.apparent,
+                              engine::direction_of<engine::J2000>(line.camera.position.m));
   }
   void apply(const Command& /*command*/) noexcept override {}
   [[nodiscard]] TrimAngles trim_rad() const noexcept override { return {}; }
@@ -26,6 +36,7 @@ class ScriptedPointing final : public PointingSource {
   const engine::Propagator& target_;
   engine::Epoch epoch_;
   engine::LightPath path_;
+  RollRule roll_;
 };
 
 }  // namespace hil

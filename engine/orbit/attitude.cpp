@@ -41,18 +41,22 @@ Rotation<BodyFrame, OrbitalFrame> body_offset(const EulerOffsets& offsets) noexc
           axes_turned(offsets.yaw_rad, Vector3d::UnitZ())};
 }
 
-CameraAttitude look_along(const Direction<J2000>& boresight) noexcept {
-  constexpr double kPoleLimit = 1e-9;
+CameraAttitude look_along(const Direction<J2000>& boresight,
+                          const Direction<J2000>& axis) noexcept {
+  constexpr double kAxisLimit = 1e-9;
   const Vector3d& z = boresight.unit;
-  const double across = std::hypot(z.x(), z.y());
   CameraAttitude attitude;
-  Vector3d y = Vector3d::UnitY();
-  if (across > kPoleLimit) {
-    y = Vector3d(-z.y(), z.x(), 0.0) / across;
-  } else {
+  Vector3d y = axis.unit.cross(z);
+  if (y.norm() <= kAxisLimit) {
     attitude.roll_is_fallback = true;
+    Vector3d other = Vector3d::Zero();
+    Eigen::Index smallest = 0;
+    z.cwiseAbs().minCoeff(&smallest);
+    other[smallest] = 1.0;
+    y = other - other.dot(z) * z;
   }
-  attitude.axes.matrix.row(0) = y.cross(z).normalized();
+  y.normalize();
+  attitude.axes.matrix.row(0) = y.cross(z);
   attitude.axes.matrix.row(1) = y;
   attitude.axes.matrix.row(2) = z;
   return attitude;

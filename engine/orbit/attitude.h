@@ -27,10 +27,12 @@ struct CameraAttitude {
   bool roll_is_fallback = false;  ///< the rule for the roll had no answer here
 };
 
-/// A camera that looks along `boresight`, rolled as eq 8 of Li et al. 2023 rolls it: y, down in the
-/// image, is perpendicular to the Earth's axis.
-/// We differ from the print: atan2 instead of arccos and sign. Within 1e-9 rad of the celestial
-/// pole that rule has no answer; y is then the J2000 y axis, and the attitude says so.
-[[nodiscard]] CameraAttitude look_along(const Direction<J2000>& boresight) noexcept;
+/// A camera that looks along `boresight`, rolled so that y, down in the image, is perpendicular to
+/// `axis` and x grows away from it.
+/// With the Earth's axis this is eq 8 of Li et al. 2023, without its arccos and sign. Within 1e-9
+/// rad of the axis the rule has no answer; y is then taken from the J2000 axis that lies furthest
+/// from the boresight, and the attitude says so.
+[[nodiscard]] CameraAttitude look_along(const Direction<J2000>& boresight,
+                                        const Direction<J2000>& axis = {}) noexcept;
 
 }  // namespace engine

@@ -34,7 +34,11 @@ struct SurfacePoint {
 /// Lamps are parallel and the camera is far: over one facet the direct light is the same for every
 /// ray, so it is worked out once a frame for each facet's middle instead of once a sample. At 70 km
 /// a facet of 4 m turns the view by 3e-5 rad, .5 % of the flank of the narrowest lobe.
-/// Thread: loop. Loop-safe but for the constructor.
+///
+/// Facets stand for a smooth surface: where a glint is near, a facet sends the mean over the
+/// normals of the surface it replaces. Flat facets would flash one after the other, three times too
+/// bright, and be dark between. Facets that meet at 40 deg or more are taken for an edge. Thread:
+/// loop. Loop-safe but for the constructor.
 class Facets {
  public:
   Facets(const Mesh& mesh, std::vector<Brdf> brdfs);
@@ -59,7 +63,11 @@ class Facets {
     Eigen::Vector3f normal;
     float offset_m = 0;
     std::uint32_t material = 0;
+    CornerNormals normals;  ///< of the smooth surface
+    float spread_rad = 0;   ///< of these, from the facet's own
   };
+  [[nodiscard]] double reflected(const Facet& facet, double side, const Eigen::Vector3d& to_lamp,
+                                 const Eigen::Vector3d& to_camera) const noexcept;
   void light_facet(const Snapshot& snapshot, std::size_t index) noexcept;
 
   std::vector<Facet> facets_;

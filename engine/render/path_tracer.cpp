@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "engine/core/constants.h"
+
 namespace engine {
 namespace {
 
@@ -201,24 +203,23 @@ double PathTracer::indirect_light(const Snapshot& snapshot, SurfacePoint from, V
     const MeshHit hit = scene_.intersect(from.start(), direction.cast<float>(), counts);
     if (hit.triangle == MeshHit::kNone) break;
     from = facets_.at(hit, direction.cast<float>());
+    radiance += throughput * scattered_light(snapshot, from, draws, counts);
+    if (bounce == spec_.bounces) break;
     local = basis_round(from.normal.cast<double>());
     out = local * -direction;
-    radiance += throughput * direct_light(snapshot, from, local, out, draws, counts);
-    if (bounce == spec_.bounces) break;
   }
   return radiance;
 }
 
-double PathTracer::direct_light(const Snapshot& snapshot, const SurfacePoint& at,
-                                const Matrix3d& local, const Vector3d& out, Draws& draws,
-                                RayCounts& counts) const noexcept {
+double PathTracer::scattered_light(const Snapshot& snapshot, const SurfacePoint& at, Draws& draws,
+                                   RayCounts& counts) const noexcept {
   const auto lamps = lamps_of(snapshot);
+  const Vector3d normal = at.normal.cast<double>();
   std::array<double, kLamps> light{};
   for (std::size_t k = 0; k < kLamps; ++k) {
-    if (!(lamps[k]->irradiance_w_m2 > 0.0)) continue;
-    const Vector3d in = local * lamps[k]->toward.unit;
-    if (in.z() > 0.0)
-      light[k] = lamps[k]->irradiance_w_m2 * facets_.brdf(at.material).eval(in, out) * in.z();
+    const double cos_in = normal.dot(lamps[k]->toward.unit);
+    if (cos_in <= 0.0) continue;
+    light[k] = lamps[k]->irradiance_w_m2 * cos_in * facets_.brdf(at.material).albedo(cos_in) / kPi;
   }
   const double both = light[0] + light[1];
   if (!(both > 0.0)) return 0.0;

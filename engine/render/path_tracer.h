@@ -29,6 +29,9 @@ struct RenderSpec {
 /// would give; where both are in the open that adds no noise.
 /// We differ from the print: the direct term has its cosine, and bounces are drawn from a mixture
 /// that finds every direction light can come from; the 15 deg cone of eq 13-14 loses 43-99 % of it.
+/// Light that bounces is taken to leave the surface where the lamp struck it evenly, with the
+/// albedo of its direction: the energy is kept, caustics are spread out. Followed exactly they are
+/// found by one sample in thousands, and those few move the photocentre of a frame by a pixel.
 /// Leaves out: the Sun's disc, and light that took more than `bounces` bounces.
 /// Thread: loop. Loop-safe but for the constructor.
 class PathTracer final : public Renderer {
@@ -64,9 +67,8 @@ class PathTracer final : public Renderer {
   [[nodiscard]] double indirect_light(const Snapshot& snapshot, SurfacePoint from,
                                       Eigen::Vector3d direction, Draws& draws,
                                       RayCounts& counts) const noexcept;
-  [[nodiscard]] double direct_light(const Snapshot& snapshot, const SurfacePoint& at,
-                                    const Eigen::Matrix3d& local, const Eigen::Vector3d& out,
-                                    Draws& draws, RayCounts& counts) const noexcept;
+  [[nodiscard]] double scattered_light(const Snapshot& snapshot, const SurfacePoint& at,
+                                       Draws& draws, RayCounts& counts) const noexcept;
 
   RenderSpec spec_;
   Mesh mesh_;

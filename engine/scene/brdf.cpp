@@ -21,12 +21,52 @@ double one_minus_cos(const Vector3d& a, const Vector3d& b) noexcept {
 
 }  // namespace
 
-Brdf::Brdf(const FiveParameters& parameters, Variant variant) : p_(parameters), variant_(variant) {
+Brdf::Brdf(const FiveParameters& parameters, Variant variant, double wrinkle_rad)
+    : p_(parameters), variant_(variant) {
+  if (wrinkle_rad > 0.0 && p_.kb > 0.0) blur_lobe(wrinkle_rad);
   tabulate_lobe();
   tabulate_albedo();
 }
 
-double Brdf::lobe(double x) const noexcept { return std::exp(p_.br * std::pow(x, p_.ar)); }
+double Brdf::printed_lobe(double x) const noexcept { return std::exp(p_.br * std::pow(x, p_.ar)); }
+
+double Brdf::lobe(double x) const noexcept {
+  if (blurred_lobe_.empty()) return printed_lobe(x);
+  const double place = std::sqrt(std::clamp(x, 0.0, 1.0)) * kLobeSteps;
+  const auto low = std::min(static_cast<std::size_t>(place), blurred_lobe_.size() - 2);
+  const double part = place - static_cast<double>(low);
+  return (1.0 - part) * static_cast<double>(blurred_lobe_[low]) +
+         part * static_cast<double>(blurred_lobe_[low + 1]);
+}
+
+void Brdf::blur_lobe(double wrinkle_rad) {
+  // In the plane of q = 2 sin(gamma / 2), where equal areas are equal solid angles: the lobe at
+  // distance r, spread by a normal distribution round the origin, is read off at distance q.
+  // exp(-z) I0(z) stays finite where I0 alone does not.
+  const double s2 = wrinkle_rad * wrinkle_rad;
+  const auto scaled_bessel = [](double z) {
+    // Abramowitz & Stegun 9.7.1 beyond 30: 2e-6.
+    if (z > 30.0) return (1.0 + 1.0 / (8.0 * z) + 9.0 / (128.0 * z * z)) / std::sqrt(2.0 * kPi * z);
+    return std::exp(-z) * std::cyl_bessel_i(0.0, z);
+  };
+  constexpr int kRings = 400;
+  std::vector<float> blurred(kLobeSteps + 1);
+  for (int i = 0; i <= kLobeSteps; ++i) {
+    const double q = std::sqrt(2.0) * i / kLobeSteps;
+    // Rings where the spread reaches, fine at the cusp.
+    const double reach = std::min(std::sqrt(2.0), q + 6.0 * wrinkle_rad);
+    double sum = 0;
+    for (int k = 0; k < kRings; ++k) {
+      const double t = (k + 0.5) / kRings;
+      const double r = reach * t * t;
+      const double dr = reach * 2.0 * t / kRings;
+      sum += printed_lobe(0.5 * r * r) * std::exp(-0.5 * (q - r) * (q - r) / s2) *
+             scaled_bessel(q * r / s2) * r * dr / s2;
+    }
+    blurred[static_cast<std::size_t>(i)] = static_cast<float>(sum);
+  }
+  blurred_lobe_ = std::move(blurred);
+}
 
 double Brdf::specular(const Vector3d& in, const Vector3d& out) const noexcept {
   const Vector3d h = (in + out).normalized();
@@ -77,6 +117,11 @@ double Brdf::albedo(double cos_in) const noexcept {
 }
 
 void Brdf::tabulate_lobe() {
+  if (p_.kb > 0.0) {
+    const double half = 0.5 * lobe(0.0);
+    while (lobe(1.0 - std::cos(lobe_half_width_rad_)) > half && lobe_half_width_rad_ < 1.5)
+      lobe_half_width_rad_ += 1e-4;
+  }
   // The half vector is drawn with a density like the lobe's. x = 1 - cos gamma on a grid that is
   // fine at the cusp; then its distribution is inverted at even steps.
   constexpr int kFine = 16384;
@@ -185,7 +230,8 @@ std::vector<Material> read_materials(const ConfigReader& config) {
     p.ar = p.kb > 0.0 ? table.number("ar", positive()) : p.ar;
     p.br = p.kb > 0.0 ? table.number("br", from_below(-1e6, 0.0)) : p.br;
     p.kr = p.kb > 0.0 ? table.number("kr", positive()) : p.kr;
-    materials.push_back({name, Brdf(p, variant)});
+    const double wrinkle_deg = table.number_or("wrinkle_deg", 0.0, between(0.0, 30.0));
+    materials.push_back({name, Brdf(p, variant, wrinkle_deg * kDegree)});
   }
   return materials;
 }

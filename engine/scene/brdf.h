@@ -29,12 +29,15 @@ struct FiveParameters {
 ///    and the specular term is scaled, alike for both directions, so that the two together never
 ///    send back more than came in. Reciprocal. The printed kd/cos_i passes albedo 1 at 76 deg.
 ///  - `paper` keeps the printed terms, clamped so that the albedo stays 1 at most.
+///  - `wrinkle_rad` > 0 blurs the lobe by the normals of a crinkled foil, normally distributed with
+///    this rms in each direction; the energy stays. A sample for a goniometer lies flat, a blanket
+///    on a spacecraft does not.
 /// A Lambert surface is kb = 0. Leaves out colour and polarisation.
 class Brdf {
  public:
   enum class Variant : std::uint8_t { kPhysical, kPaper };
 
-  Brdf(const FiveParameters& parameters, Variant variant);
+  Brdf(const FiveParameters& parameters, Variant variant, double wrinkle_rad = 0);
 
   /// 1/sr; 0 below the horizon. Finite everywhere.
   [[nodiscard]] double eval(const Eigen::Vector3d& in, const Eigen::Vector3d& out) const noexcept;
@@ -43,6 +46,10 @@ class Brdf {
                                   const Eigen::Vector3d& out) const noexcept;
   /// The share of light from `cos_in` that goes anywhere at all.
   [[nodiscard]] double albedo(double cos_in) const noexcept;
+
+  /// Of the specular lobe, in angles of the half vector: where it has fallen to a half; 0 without
+  /// one.
+  [[nodiscard]] double lobe_half_width_rad() const noexcept { return lobe_half_width_rad_; }
 
   struct Sample {
     Eigen::Vector3d in = Eigen::Vector3d::UnitZ();
@@ -56,18 +63,23 @@ class Brdf {
  private:
   static constexpr int kAngles = 128;
   static constexpr int kLobeCells = 512;
+  static constexpr int kLobeSteps = 2048;
 
   [[nodiscard]] double specular(const Eigen::Vector3d& in,
                                 const Eigen::Vector3d& out) const noexcept;
   [[nodiscard]] double lobe(double one_minus_cos) const noexcept;
+  [[nodiscard]] double printed_lobe(double one_minus_cos) const noexcept;
   [[nodiscard]] double specular_limit(double cos_in) const noexcept;
   [[nodiscard]] double specular_albedo(double cos_in) const noexcept;
   [[nodiscard]] double lobe_share(const Eigen::Vector3d& out) const noexcept;
+  void blur_lobe(double wrinkle_rad);
   void tabulate_lobe();
   void tabulate_albedo();
 
   FiveParameters p_;
   Variant variant_;
+  double lobe_half_width_rad_ = 0;
+  std::vector<float> blurred_lobe_;  ///< by sqrt(1 - cos gamma), 0 to 1; empty without wrinkles
   std::array<float, kLobeCells + 1> lobe_edges_{};  ///< of 1 - cos gamma; each cell equally likely
   std::array<float, kAngles> specular_albedo_{};    ///< by the cosine: cell centres
 };

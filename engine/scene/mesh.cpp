@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include <tiny_obj_loader.h>
 
@@ -30,6 +31,46 @@ double Mesh::bounding_radius_m() const noexcept {
   double r2 = 0;
   for (const auto& v : vertices) r2 = std::max(r2, v.cast<double>().squaredNorm());
   return std::sqrt(r2);
+}
+
+std::vector<CornerNormals> smooth_normals(const Mesh& mesh, double crease_rad) {
+  using Eigen::Vector3f;
+  struct Corner {
+    std::size_t triangle;
+    Vector3f normal;
+    float angle;
+  };
+  // By place, not by index: parts of a mesh often have corners of their own.
+  std::map<std::array<float, 3>, std::vector<Corner>> round_place;
+  const auto place = [&](const Mesh::Triangle& t, std::size_t c) -> const Vector3f& {
+    return mesh.vertices[t.corner[c]];
+  };
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+    const Mesh::Triangle& t = mesh.triangles[i];
+    for (std::size_t c = 0; c < 3; ++c) {
+      const Vector3f& p = place(t, c);
+      const Vector3f e1 = place(t, (c + 1) % 3) - p;
+      const Vector3f e2 = place(t, (c + 2) % 3) - p;
+      const Vector3f across = e1.cross(e2);
+      round_place[{p.x(), p.y(), p.z()}].push_back(
+          {i, across.normalized(), std::atan2(across.norm(), e1.dot(e2))});
+    }
+  }
+  const auto crease_cosine = static_cast<float>(std::cos(crease_rad));
+  std::vector<CornerNormals> normals(mesh.triangles.size());
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      const Vector3f& p = place(mesh.triangles[i], c);
+      const std::vector<Corner>& corners = round_place[{p.x(), p.y(), p.z()}];
+      const auto own = std::find_if(corners.begin(), corners.end(),
+                                    [i](const Corner& corner) { return corner.triangle == i; });
+      Vector3f sum = Vector3f::Zero();
+      for (const Corner& corner : corners)
+        if (corner.normal.dot(own->normal) >= crease_cosine) sum += corner.angle * corner.normal;
+      normals[i][c] = sum.normalized();
+    }
+  }
+  return normals;
 }
 
 Mesh load_obj(const std::string& path, MeshReport& report) {

@@ -27,6 +27,13 @@ struct Mesh {
   [[nodiscard]] double bounding_radius_m() const noexcept;
 };
 
+/// The normals of the smooth surface that a triangle stands for, one at each corner, unit.
+using CornerNormals = std::array<Eigen::Vector3f, 3>;
+
+/// For each triangle. Faces that meet at less than `crease_rad` belong to one smooth surface: its
+/// normal at a corner is their mean, each weighted by its angle there.
+[[nodiscard]] std::vector<CornerNormals> smooth_normals(const Mesh& mesh, double crease_rad);
+
 /// What was left out of a file so that the rest could be used.
 struct MeshReport {
   std::size_t not_finite = 0;  ///< faces with a corner that is not a number

@@ -35,7 +35,7 @@ constexpr double kShellRadius_m = 1.55;
 constexpr double kShieldRadius_m = 1.51;
 constexpr double kInnerRadius_m = 1.45;
 
-constexpr double kDoorOpen_rad = 105.0 * kDegree;
+constexpr double kDoorOpen_rad = 90.0 * kDegree;
 
 constexpr double kWingTip_m = 6.85;
 constexpr double kWingWidth_m = 2.6;

@@ -8,7 +8,7 @@ namespace engine {
 ///
 /// Body frame, metres, origin on the tube's axis at the middle of its length: +x along the tube to
 /// the aperture, +z to the nadir, solar wings along +-y with their cells facing -z. The Sun side is
-/// -z; there the aperture door has its hinge, 105 degrees open. High-gain antennas along +-z.
+/// -z; there the aperture door has its hinge, a right angle open. High-gain antennas along +-z.
 ///
 /// Materials: "silicon" (solar cells), "polyimide" (all insulation, booms and panel backs), "black"
 /// (inside of the tube, baffles). Every part is a closed solid; parts reach into one another where

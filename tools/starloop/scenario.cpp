@@ -50,11 +50,9 @@ RunSpec read_run(const ConfigTable& table) {
   return run;
 }
 
-tracker::TrackerSpec read_tracker(const ConfigTable& table, const engine::CameraGeometry& camera,
-                                  Duration period) {
+tracker::TrackerSpec read_tracker(const ConfigTable& table, const engine::CameraGeometry& camera) {
   tracker::TrackerSpec spec;
   spec.ifov_rad = camera.ifov_rad();
-  spec.frame_period_s = engine::seconds(period);
   spec.threshold_sigma =
       table.number_or("threshold_sigma", spec.threshold_sigma, engine::positive());
   spec.alpha = table.number_or("alpha", spec.alpha, engine::between(0.0, 1.0));
@@ -113,8 +111,12 @@ Scenario read_scenario(const ConfigReader& config) {
   s.detector = engine::read_detector(config.table("detector"), s.scene.camera.pixel_pitch_m,
                                      s.scene.sun.mean_wavelength_m);
   s.guidance = hil::read_guidance_error(config.table("guidance"));
+  s.roll = config.table("guidance")
+               .choice_or<hil::RollRule>("roll", "celestial",
+                                         {{"celestial", hil::RollRule::kCelestial},
+                                          {"vertical", hil::RollRule::kVertical}});
   s.actuator = hil::read_actuator(config.table("actuator"));
-  s.tracker = read_tracker(config.table("tracker"), s.scene.camera, s.run.period);
+  s.tracker = read_tracker(config.table("tracker"), s.scene.camera);
   config.reject_unknown_keys();
   return s;
 }
@@ -129,6 +131,7 @@ Scenario load_scenario(const CommonOptions& options) {
 Rig::Rig(const Scenario& scenario, int threads)
     : epoch_(scenario.scene.epoch),
       path_(scenario.scene.light_path),
+      roll_(scenario.roll),
       camera_(scenario.camera_orbit, epoch_),
       target_(scenario.target_orbit, epoch_),
       pool_(worker_threads(threads)) {
@@ -149,7 +152,7 @@ Rig::Rig(const Scenario& scenario, int threads)
       &hil::SteadyClock::stopwatch);
 }
 
-hil::ScriptedPointing Rig::prediction() const { return {camera_, target_, epoch_, path_}; }
+hil::ScriptedPointing Rig::prediction() const { return {camera_, target_, epoch_, path_, roll_}; }
 
 std::vector<engine::Pass> passes_of(const Scenario& scenario) {
   const engine::Epoch epoch = scenario.scene.epoch;

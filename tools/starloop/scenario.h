@@ -50,6 +50,7 @@ struct Scenario {
   engine::OpticsSpec optics;
   engine::DetectorSpec detector;
   hil::GuidanceError guidance;
+  hil::RollRule roll = hil::RollRule::kCelestial;
   hil::ActuatorSpec actuator;
   tracker::TrackerSpec tracker;
 };
@@ -83,6 +84,7 @@ class Rig {
  private:
   engine::Epoch epoch_;
   engine::LightPath path_;
+  hil::RollRule roll_;
   engine::KeplerPropagator camera_;
   engine::KeplerPropagator target_;
   engine::WorkerPool pool_;

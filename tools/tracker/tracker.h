@@ -12,10 +12,9 @@ namespace tracker {
 
 struct TrackerSpec {
   double ifov_rad = 1.4444e-6;
-  double frame_period_s = 0.1;
   double threshold_sigma = 5;  ///< above the background
-  double alpha = 0.5;          ///< share of a surprise that goes into the offset
-  double beta = 0.2;           ///< and into the rate
+  double alpha = 0.8;          ///< share of a surprise that goes into the offset
+  double beta = 0.5;           ///< and into the rate
   bool reports_only = false;   ///< says what it sees and asks for nothing
 };
 
