@@ -163,8 +163,12 @@ bool ConfigTable::has(const std::string& key) const {
   return document_->find(path(key)) != nullptr;
 }
 
+std::string ConfigTable::where(const std::string& key) const {
+  return document_->origin(path(key)) + ": " + path(key);
+}
+
 void ConfigTable::fail(const std::string& key, const std::string& complaint) const {
-  throw ConfigError(document_->origin(path(key)) + ": " + path(key) + " " + complaint);
+  throw ConfigError(where(key) + " " + complaint);
 }
 
 double ConfigTable::number(const std::string& key, const Range& range) const {

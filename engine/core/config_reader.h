@@ -108,7 +108,9 @@ class ConfigTable {
     fail(key, "must be one of " + words + ", got \"" + word + "\"");
   }
 
-  /// Throws "file:line: table.key " + complaint.
+  /// "file:line: table.key", for a complaint that comes later.
+  [[nodiscard]] std::string where(const std::string& key) const;
+  /// Throws where(key) + " " + complaint.
   [[noreturn]] void fail(const std::string& key, const std::string& complaint) const;
 
  private:

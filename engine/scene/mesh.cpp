@@ -79,7 +79,8 @@ Mesh load_obj(const std::string& path, MeshReport& report) {
   config.vertex_color = false;
   tinyobj::ObjReader reader;
   if (!reader.ParseFromFile(path, config)) {
-    const std::string why = reader.Error().empty() ? "cannot be read" : reader.Error();
+    std::string why = reader.Error().empty() ? "cannot be read" : reader.Error();
+    while (why.back() == '\n') why.pop_back();
     throw ConfigError(path + ": expected an OBJ mesh: " + why);
   }
   const auto& coordinates = reader.GetAttrib().vertices;

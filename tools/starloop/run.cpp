@@ -104,9 +104,9 @@ class Observer {
 engine::Pass choose_pass(const Scenario& scenario) {
   const std::vector<engine::Pass> passes = passes_of(scenario);
   if (scenario.run.pass > passes.size()) {
-    throw engine::ConfigError("run.pass must be one of the " + std::to_string(passes.size()) +
-                              " passes that these orbits have, got " +
-                              std::to_string(scenario.run.pass));
+    throw engine::ConfigError(
+        scenario.run.pass_where + " must be one of the " + std::to_string(passes.size()) +
+        " passes that these orbits have, got " + std::to_string(scenario.run.pass));
   }
   return passes[scenario.run.pass - 1];
 }

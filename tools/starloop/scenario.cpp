@@ -1,6 +1,7 @@
 #include "tools/starloop/scenario.h"
 
 #include <algorithm>
+#include <cstdio>
 #include <thread>
 
 #include "engine/orbit/utc.h"
@@ -31,6 +32,7 @@ engine::Epoch read_epoch(const ConfigTable& table) {
 RunSpec read_run(const ConfigTable& table) {
   RunSpec run;
   run.pass = static_cast<std::size_t>(table.integer("pass", engine::at_least(1.0)));
+  run.pass_where = table.where("pass");
   run.duration_s = table.number_or("duration_s", 0.0, engine::at_least(0.0));
   run.exposure = from_seconds(table.number("exposure_ms", engine::between(1e-3, 1e5)) * 1e-3);
   run.period = from_seconds(1.0 / table.number("frame_rate_hz", engine::between(0.01, 1000.0)));
@@ -60,10 +62,19 @@ tracker::TrackerSpec read_tracker(const ConfigTable& table, const engine::Camera
   return spec;
 }
 
-engine::Mesh load_mesh(const std::string& mesh) {
-  if (mesh == "telescope") return engine::telescope_mesh();
+engine::Mesh load_mesh(const Scenario& scenario) {
+  if (scenario.mesh == "telescope") return engine::telescope_mesh();
   engine::MeshReport report;
-  return engine::load_obj(mesh, report);
+  engine::Mesh mesh;
+  try {
+    mesh = engine::load_obj(scenario.mesh, report);
+  } catch (const engine::ConfigError& e) {
+    throw engine::ConfigError(scenario.mesh_where + ": " + e.what());
+  }
+  if (report.left_out() > 0)
+    std::fprintf(stderr, "%s: %zu faces left out: %zu not finite, %zu without area\n",
+                 scenario.mesh.c_str(), report.left_out(), report.not_finite, report.zero_area);
+  return mesh;
 }
 
 int worker_threads(int wanted) {
@@ -104,6 +115,7 @@ Scenario read_scenario(const ConfigReader& config) {
       visibility.number_or("span_days", 15.0, engine::between(0.001, 1000.0)) * 86400.0);
 
   s.mesh = config.table("target").text_or("mesh", "telescope");
+  s.mesh_where = config.table("target").where("mesh");
   s.materials = engine::read_materials(config);
   s.optics = engine::read_optics(config.table("optics"), s.scene.camera);
   s.render = engine::read_render(config.table("render"));
@@ -142,10 +154,15 @@ Rig::Rig(const Scenario& scenario, int threads)
   engine::Optics optics(scenario.optics, faint_w_m2, pool_);
   engine::RenderSpec render = scenario.render;
   render.grid = optics.wish();
-  engine::Mesh mesh = load_mesh(scenario.mesh);
+  engine::Mesh mesh = load_mesh(scenario);
   triangles_ = mesh.triangles.size();
-  auto tracer =
-      std::make_unique<engine::PathTracer>(render, std::move(mesh), scenario.materials, pool_);
+  std::unique_ptr<engine::PathTracer> tracer;
+  try {
+    tracer =
+        std::make_unique<engine::PathTracer>(render, std::move(mesh), scenario.materials, pool_);
+  } catch (const engine::ConfigError& e) {
+    throw engine::ConfigError(scenario.mesh_where + ": " + e.what());
+  }
   chain_ = std::make_unique<engine::ImagingChain>(
       engine::SnapshotBuilder(scenario.scene, camera_, target_), std::move(tracer),
       std::move(optics), engine::Detector(detector, pool_), detector, scenario.scene.camera,

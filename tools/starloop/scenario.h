@@ -20,6 +20,7 @@ enum class ClockMode : std::uint8_t { kRealtime, kLockstep };
 /// How a run goes: when, how fast, what is kept.
 struct RunSpec {
   std::size_t pass = 1;   ///< counted from 1
+  std::string pass_where;   ///< the place in the scenario that says so
   double duration_s = 0;  ///< 0: the whole pass
   engine::Duration exposure{};
   engine::Duration period{};
@@ -45,6 +46,7 @@ struct Scenario {
   engine::Duration search_span{};
   engine::SceneSpec scene;
   std::string mesh;
+  std::string mesh_where;  ///< the place in the scenario that names it
   std::vector<engine::Material> materials;
   engine::RenderSpec render;
   engine::OpticsSpec optics;

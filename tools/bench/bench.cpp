@@ -1,0 +1,113 @@
+// What each model costs. Machines are shared and noisy: compare lines of one run with each other, or
+// two builds run in turn, never with a number from another day.
+//   build/release/bench                       everything
+//   build/release/bench --benchmark_filter=Frame
+#include <benchmark/benchmark.h>
+
+#include "drivers/frame_packet.h"
+#include "engine/core/random.h"
+#include "tools/starloop/scenario.h"
+
+namespace {
+
+using namespace engine;
+
+starloop::Scenario flyby() {
+  starloop::CommonOptions options;
+  options.file = STARLOOP_SOURCE_DIR "/config/flyby.toml";
+  return starloop::load_scenario(options);
+}
+
+void Kepler(benchmark::State& state) {
+  const double e = 1.0 - std::pow(10.0, -static_cast<double>(state.range(0)));
+  double m = 0.0;
+  for (auto _ : state) benchmark::DoNotOptimize(solve_kepler(e, m += 0.7));
+}
+BENCHMARK(Kepler)->ArgName("digits_of_e_from_1")->Arg(0)->Arg(2)->Arg(6)->Arg(12);
+
+void Sun(benchmark::State& state) {
+  const auto model = state.range(0) == 0 ? SunModel::kTable1 : SunModel::kErfa;
+  Epoch t{};
+  for (auto _ : state) benchmark::DoNotOptimize(sun_position(model, t += Duration(1'000'000)));
+}
+BENCHMARK(Sun)->ArgName("table1_erfa")->Arg(0)->Arg(1);
+
+void PassesOf15Days(benchmark::State& state) {
+  const starloop::Scenario scenario = flyby();
+  for (auto _ : state) benchmark::DoNotOptimize(starloop::passes_of(scenario));
+}
+BENCHMARK(PassesOf15Days)->Unit(benchmark::kMillisecond);
+
+void Earthshine(benchmark::State& state) {
+  const Position<J2000> target{{0.0, 0.0, 6.8e6}};
+  const auto to_sun = direction_of<J2000>({1.0, 0.0, 0.2});
+  for (auto _ : state) benchmark::DoNotOptimize(earthshine_vector(target, to_sun, 0.3, 1.0));
+}
+BENCHMARK(Earthshine);
+
+void BrdfEval(benchmark::State& state) {
+  const Brdf brdf({}, state.range(0) == 0 ? Brdf::Variant::kPhysical : Brdf::Variant::kPaper);
+  const Eigen::Vector3d in = Eigen::Vector3d(0.3, 0.2, 0.8).normalized();
+  const Eigen::Vector3d out = Eigen::Vector3d(-0.3, -0.1, 0.8).normalized();
+  for (auto _ : state) benchmark::DoNotOptimize(brdf.eval(in, out));
+}
+BENCHMARK(BrdfEval)->ArgName("physical_paper")->Arg(0)->Arg(1);
+
+void Poisson(benchmark::State& state) {
+  const double mean = std::pow(10.0, static_cast<double>(state.range(0)));
+  Draws draws(1, Stream::kShot, 0, 0);
+  for (auto _ : state) benchmark::DoNotOptimize(draws.poisson(mean));
+}
+BENCHMARK(Poisson)->ArgName("log10_mean")->DenseRange(-2, 4, 1);
+
+/// A whole frame of the paper's pass, so many seconds after its closest point; stages as counters.
+void Frame(benchmark::State& state) {
+  const starloop::Scenario scenario = flyby();
+  starloop::Rig rig(scenario, static_cast<int>(state.range(1)));
+  hil::ScriptedPointing pointing = rig.prediction();
+  Shot shot;
+  shot.shutter_open = sim_time(309781.706 + static_cast<double>(state.range(0)));
+  shot.exposure = scenario.run.exposure;
+  shot.attitude = {pointing.attitude(shot.shutter_open),
+                   pointing.attitude(shot.shutter_open + shot.exposure / 2),
+                   pointing.attitude(shot.shutter_open + shot.exposure)};
+  DnImage image(scenario.scene.camera.width_px, scenario.scene.camera.height_px);
+  FrameReport report;
+  double render_s = 0;
+  double optics_s = 0;
+  double detector_s = 0;
+  for (auto _ : state) {
+    ++shot.sequence;
+    report = rig.chain().expose(shot, Budget{}, image);
+    render_s += seconds(report.times.render);
+    optics_s += seconds(report.times.optics);
+    detector_s += seconds(report.times.detector);
+  }
+  const auto per_frame_ms = benchmark::Counter::kAvgIterations;
+  state.counters["render_ms"] = benchmark::Counter(render_s * 1e3, per_frame_ms);
+  state.counters["optics_ms"] = benchmark::Counter(optics_s * 1e3, per_frame_ms);
+  state.counters["detector_ms"] = benchmark::Counter(detector_s * 1e3, per_frame_ms);
+  state.counters["range_km"] = report.truth.range_m * 1e-3;
+  state.counters["rays"] = static_cast<double>(report.render.rays);
+}
+BENCHMARK(Frame)
+    ->ArgNames({"s_after_closest", "threads"})
+    ->ArgsProduct({{0, 5, 10, 20}, {1, 2}})
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
+
+void FramePacket(benchmark::State& state) {
+  const DnImage image(1024, 1024);
+  hil::Frame frame;
+  frame.pixels = &image;
+  std::vector<std::byte> bytes(drivers::frame_bytes(1024, 1024));
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(drivers::encode_frame(frame, bytes));
+    if (state.range(0) == 1) benchmark::DoNotOptimize(drivers::decode_frame(bytes));
+  }
+}
+BENCHMARK(FramePacket)->ArgName("and_decode")->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond);
+
+}  // namespace
+
+BENCHMARK_MAIN();

@@ -1,0 +1,37 @@
+#!/usr/bin/env bash
+# Installs what Starloop needs from Debian 12's own packages; only what is missing, and says so.
+set -euo pipefail
+
+packages=(
+  # build
+  g++ cmake ninja-build ccache pkg-config git
+  # libraries that the program links
+  libembree-dev libopencv-dev libeigen3-dev libtomlplusplus-dev libcli11-dev libspdlog-dev
+  liberfa-dev libcfitsio-dev librandom123-dev libtinyobjloader-dev nlohmann-json3-dev
+  # tests, benchmarks, pictures
+  libgtest-dev libbenchmark-dev python3 python3-matplotlib python3-numpy
+)
+# The slow checks of tools/test.sh --full only.
+if [[ "${1:-}" == "--full" ]]; then packages+=(clang-format clang-tidy); fi
+
+missing=()
+for package in "${packages[@]}"; do
+  if [[ "$(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null || true)" != installed ]]; then
+    missing+=("$package")
+  fi
+done
+if (( ${#missing[@]} == 0 )); then exit 0; fi
+
+as_root=()
+if (( EUID != 0 )); then
+  if ! command -v sudo >/dev/null; then
+    echo "tools/setup.sh: these packages are missing, and installing them needs root or sudo:" >&2
+    echo "  ${missing[*]}" >&2
+    exit 3
+  fi
+  as_root=(sudo)
+fi
+echo "installing ${#missing[@]} packages: ${missing[*]}"
+"${as_root[@]}" apt-get update -q
+"${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends \
+  "${missing[@]}"
