@@ -19,7 +19,7 @@ struct CameraGeometry {
 
   /// The boresight's place: the centre of pixel (width/2, height/2).
   [[nodiscard]] PixelPoint principal_point() const noexcept {
-    return {static_cast<double>(width_px / 2), static_cast<double>(height_px / 2)};
+    return {std::floor(0.5 * width_px), std::floor(0.5 * height_px)};
   }
   [[nodiscard]] double pixels_per_radian() const noexcept { return focal_length_m / pixel_pitch_m; }
   [[nodiscard]] double ifov_rad() const noexcept { return pixel_pitch_m / focal_length_m; }

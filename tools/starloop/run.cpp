@@ -164,7 +164,8 @@ void write_report(const fs::path& folder, const Scenario& s, const engine::Pass&
       {"threads", threads},
       {"clock", s.run.clock == ClockMode::kLockstep ? "lockstep" : "realtime"},
       {"pass",
-       {{"start_s", seconds(pass.start)},
+       {{"number", s.run.pass},
+        {"start_s", seconds(pass.start)},
         {"end_s", seconds(pass.end)},
         {"closest_s", seconds(pass.closest)},
         {"min_range_km", pass.min_range_m * 1e-3}}},
@@ -177,7 +178,11 @@ void write_report(const fs::path& folder, const Scenario& s, const engine::Pass&
         {"late", l.late},
         {"records_lost", l.records_lost}}},
       {"commands",
-       {{"obeyed", l.commands}, {"refused", l.command_faults}, {"lost", l.commands_lost}}},
+       {{"taken", l.commands}, {"refused", l.command_faults}, {"lost", l.commands_lost}}},
+      {"camera",
+       {{"ifov_rad", s.scene.camera.ifov_rad()},
+        {"width_px", s.scene.camera.width_px},
+        {"height_px", s.scene.camera.height_px}}},
       {"answer_missing", l.answer_missing},
       {"command_latency_frames", 1},
       {"pointing",
@@ -192,7 +197,7 @@ void write_report(const fs::path& folder, const Scenario& s, const engine::Pass&
       {"left_out",
        {"the Earth and stars behind the target", "defocus", "the Sun's disc",
         "PRNU, DSNU and defects"}},
-      {"criteria_met", v.good}};
+      {"criteria_met", open_loop ? nlohmann::json(nullptr) : nlohmann::json(v.good)}};
   std::ofstream(folder / "report.json") << report.dump(2) << "\n";
 }
 
@@ -200,7 +205,7 @@ void print_summary(const RunLog& log, const Verdict& v, const Scenario& s, bool 
   const hil::LoopReport& l = log.loop;
   spdlog::info("frames: {} due = {} sent + {} skipped + {} dropped + {} faults; {} late", l.due,
                l.sent, l.skipped, l.dropped, l.faults, l.late);
-  spdlog::info("commands: {} obeyed, {} refused, {} lost", l.commands, l.command_faults,
+  spdlog::info("commands: {} taken, {} refused, {} lost", l.commands, l.command_faults,
                l.commands_lost);
   if (v.whole.lost_after_s)
     spdlog::info("the target's centre leaves the frame after {:.1f} s", *v.whole.lost_after_s);

@@ -117,8 +117,10 @@ void Tracker::filter(const drivers::FrameView& view, const hil::Detection& detec
   const engine::SimTime middle = view.frame.shutter_open + view.frame.exposure / 2;
   // Where the target is seen, less where it ought to be seen; the boresight has to move that way.
   const std::array<double, 2> measured{
-      (detection.centroid_px.u - width_px_ / 2) * spec_.ifov_rad + view.frame.trim_rad[0],
-      (detection.centroid_px.v - height_px_ / 2) * spec_.ifov_rad + view.frame.trim_rad[1]};
+      (detection.centroid_px.u - std::floor(0.5 * width_px_)) * spec_.ifov_rad +
+          view.frame.trim_rad[0],
+      (detection.centroid_px.v - std::floor(0.5 * height_px_)) * spec_.ifov_rad +
+          view.frame.trim_rad[1]};
   const double dt = engine::seconds(middle - last_seen_);
   for (std::size_t i = 0; i < 2; ++i) {
     Axis& axis = axes_[i];
