@@ -101,6 +101,9 @@ engine::Expected<FrameView> decode_frame(std::span<const std::byte> in) noexcept
   view.frame.exposure = Duration(get<std::int64_t>(in, 24));
   view.frame.bits = get<std::uint8_t>(in, 36);
   view.frame.trim_rad = {get<double>(in, 56), get<double>(in, 64)};
+  if (view.frame.bits < 1 || view.frame.bits > 16) return rejected("bits of a pixel");
+  if (!std::isfinite(view.frame.trim_rad[0]) || !std::isfinite(view.frame.trim_rad[1]))
+    return rejected("a number that is not finite");
   return view;
 }
 
@@ -135,6 +138,8 @@ engine::Expected<hil::Command> decode_command(std::span<const std::byte> in) noe
                                    static_cast<double>(get<float>(in, 68))};
   command.detection.confidence = get<float>(in, 72);
   if (!finite(command)) return rejected("a number that is not finite");
+  if (command.detection.confidence < 0.0F || command.detection.confidence > 1.0F)
+    return rejected("a confidence outside 0 to 1");
   return command;
 }
 

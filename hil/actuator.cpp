@@ -42,9 +42,12 @@ void Actuator::advance_to(SimTime t) noexcept {
 }
 
 void Actuator::step(Duration d) noexcept {
-  now_ += d;
   const double dt = engine::seconds(d);
-  const double wanted = target_rad_ + target_rate_rad_s_ * engine::seconds(now_ - target_time_);
+  // No command, however absurd, asks for more than half a turn: what follows stays finite.
+  const double wanted =
+      std::clamp(target_rad_ + target_rate_rad_s_ * engine::seconds(now_ - target_time_),
+                 -engine::kPi, engine::kPi);
+  now_ += d;
   const double acceleration =
       stiffness_1_s2_ * (wanted - angle_rad_) + damping_1_s_ * (target_rate_rad_s_ - rate_rad_s_);
   const double most = spec_.acceleration_limit_rad_s2;

@@ -4,6 +4,8 @@
 #include <thread>
 #include <utility>
 
+#include "hil/steady_clock.h"
+
 namespace hil {
 
 using engine::Duration;
@@ -59,8 +61,8 @@ LoopReport FrameLoop::run(const std::stop_token& stop) {
       ++report.dropped;
     }
     if (!frames_.push(record)) ++report.records_lost;
-    if (record.handed_over && spec_.answer_timeout > Duration{} && !wait_for_answer(k, report)) {
-      report.answer_missing = true;
+    if (record.handed_over && spec_.answer_timeout > Duration{} &&
+        !wait_for_answer(k, stop, report)) {
       break;
     }
   }
@@ -138,9 +140,16 @@ void FrameLoop::expose(std::uint64_t k, std::size_t slot, FrameRecord& record) n
   ready_count_.release();
 }
 
-bool FrameLoop::wait_for_answer(std::uint64_t k, LoopReport& report) noexcept {
-  for (;;) {
-    if (!received_count_.try_acquire_for(spec_.answer_timeout)) return false;
+bool FrameLoop::wait_for_answer(std::uint64_t k, const std::stop_token& stop,
+                                LoopReport& report) noexcept {
+  const Duration give_up = SteadyClock::stopwatch() + spec_.answer_timeout;
+  while (!stop.stop_requested()) {
+    const Duration left = give_up - SteadyClock::stopwatch();
+    if (left <= Duration{}) {
+      report.answer_missing = true;
+      return false;
+    }
+    if (!received_count_.try_acquire_for(std::min(left, kPatience))) continue;
     Command command;
     if (!received_.pop(command)) continue;
     if (waiting_.size() < kMostWaiting) {
@@ -150,6 +159,7 @@ bool FrameLoop::wait_for_answer(std::uint64_t k, LoopReport& report) noexcept {
     }
     if (command.answers_frame == k) return true;
   }
+  return false;
 }
 
 void FrameLoop::send_frames(const std::stop_token& stop) noexcept {

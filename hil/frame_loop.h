@@ -100,7 +100,9 @@ class FrameLoop {
   [[nodiscard]] bool acquire_slot(const std::stop_token& stop, std::size_t& slot) noexcept;
   void obey(std::uint64_t k, LoopReport& report) noexcept;
   void expose(std::uint64_t k, std::size_t slot, FrameRecord& record) noexcept;
-  [[nodiscard]] bool wait_for_answer(std::uint64_t k, LoopReport& report) noexcept;
+  /// False: it did not come in time, or the loop is to stop.
+  [[nodiscard]] bool wait_for_answer(std::uint64_t k, const std::stop_token& stop,
+                                     LoopReport& report) noexcept;
   void take_command(const Command& command, std::uint64_t k, LoopReport& report) noexcept;
   void send_frames(const std::stop_token& stop) noexcept;
   void receive_commands(const std::stop_token& stop) noexcept;

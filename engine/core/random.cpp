@@ -8,6 +8,8 @@ namespace {
 // Above this mean a rounded normal differs from Poisson by a total variation of .126/sqrt(mean),
 // 4e-6 here: no sensor tells it, and lgamma loses digits there.
 constexpr double kNormalLimit = 1e9;
+// From here on a double cannot hold the noise beside the mean; infinite light comes out as it is.
+constexpr double kExactLimit = 1e30;
 
 /// PTRS, transformed rejection with squeeze: Hoermann 1993, DOI 10.1016/0167-6687(93)90997-4.
 double by_rejection(Draws& draws, double mean) noexcept {
@@ -47,6 +49,7 @@ double Draws::poisson_from(double uniform, double mean) noexcept {
 
 double Draws::poisson(double mean) noexcept {
   if (!(mean > 0.0)) return 0.0;
+  if (mean > kExactLimit) return mean;
   // 53 bits, not 24: at a mean of 1e-6 a coarse uniform would lose the tail altogether.
   if (mean < kInversionLimit) return poisson_from(uniform_double(), mean);
   if (mean < kNormalLimit) return by_rejection(*this, mean);

@@ -181,15 +181,16 @@ void Optics::add_points(const Radiance& in, const Grid& grid, int column,
                         std::span<Complex> spectrum) const noexcept {
   const double fx = static_cast<double>(column) / grid.pixels_x;  // cycles per pixel
   const double cell = 1.0 / kOversampling;
-  // A cell's solid angle turns the irradiance of a point into the radiance of one cell.
-  const double to_radiance = std::pow(kOversampling / spec_.camera.ifov_rad(), 2) / sinc(fx * cell);
+  // A cell's solid angle turns the irradiance of a point into the radiance of one cell. A point is
+  // no average over a cell: what multiply_otf() takes out for that goes in here.
+  const double to_radiance = std::pow(kOversampling / spec_.camera.ifov_rad(), 2) * sinc(fx * cell);
   for (const PointSource& p : in.points) {
     const double x = p.place.u - grid.left;
     const double y = p.place.v - grid.top;
     for (int k = 0; k < grid.cells_y(); ++k) {
       const int signed_k = k <= grid.cells_y() / 2 ? k : k - grid.cells_y();
       const double fy = static_cast<double>(signed_k) / grid.pixels_y;
-      const double amplitude = p.irradiance_w_m2 * to_radiance / sinc(fy * cell);
+      const double amplitude = p.irradiance_w_m2 * to_radiance * sinc(fy * cell);
       const double phase = -2.0 * kPi * (fx * x + fy * y);
       spectrum[at(k)] += Complex(static_cast<float>(amplitude * std::cos(phase)),
                                  static_cast<float>(amplitude * std::sin(phase)));

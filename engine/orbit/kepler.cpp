@@ -22,9 +22,10 @@ double e_minus_sin(double e_anomaly) noexcept {
 
 EccentricAnomaly solve_upper_half(double e, double m) noexcept {
   double low = m;
-  double high = std::min(m + e, kPi);
+  // A hair above, so that rounding does not leave the root outside.
+  double high = std::min({m + e, m / (1.0 - e) * (1.0 + 1e-15), kPi});
   // Near-parabolic corner: the cubic e E^3/6 + (1 - e) E = M is the better start.
-  double x = std::min(m + 0.85 * e, kPi);
+  double x = m + e * std::sin(m) / (1.0 - std::sin(m + e) + std::sin(m));
   if (m < 0.3 && e > 0.8) {
     const double p = 2.0 * (1.0 - e) / e;
     const double q = 3.0 * m / e;
@@ -40,15 +41,14 @@ EccentricAnomaly solve_upper_half(double e, double m) noexcept {
     const double slope = (1.0 - e) + 2.0 * e * half_sine * half_sine;  // 1 - e cos E
     const double newton = f / slope;
     const double step = newton / (1.0 - 0.5 * newton * e * std::sin(x) / slope);
-    double next = x - step;
-    if (!(next >= low && next <= high)) next = 0.5 * (low + high);
-    const double moved = std::abs(next - x);
-    x = next;
+    const double next = x - step;
+    const bool inside = next >= low && next <= high;
+    const double before = x;
+    x = inside ? next : 0.5 * (low + high);
     // Halley's error is cubic: a step below 1e-6 leaves less than the rounding.
-    if (moved <= 1e-6 * x && std::abs(step) <= 1e-6 * x) break;
-    if (moved == 0.0) break;
+    if ((inside && std::abs(step) <= 1e-6 * x) || x == before) break;
   }
-  return {x, i + 1};
+  return {x, std::min(i + 1, kMostKeplerIterations)};
 }
 
 }  // namespace

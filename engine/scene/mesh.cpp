@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <limits>
 #include <map>
 
 #include <tiny_obj_loader.h>
@@ -13,6 +16,28 @@ namespace {
 
 constexpr std::size_t kMostCorners = 10'000'000;
 constexpr float kLargestCoordinate_m = 1e6F;
+
+/// Which vertices have a coordinate that is no number: the importer reads those as zero.
+std::vector<bool> unreadable_vertices(const std::string& path) {
+  std::vector<bool> unreadable;
+  std::ifstream file(path);
+  for (std::string line; std::getline(file, line);) {
+    const std::size_t start = line.find_first_not_of(" \t");
+    if (start == std::string::npos || line.compare(start, 1, "v") != 0 ||
+        start + 1 >= line.size() || (line[start + 1] != ' ' && line[start + 1] != '\t')) {
+      continue;
+    }
+    const char* at = line.c_str() + start + 1;
+    bool good = true;
+    for (int i = 0; i < 3 && good; ++i) {
+      char* end = nullptr;
+      good = std::isfinite(std::strtod(at, &end)) && end != at;
+      at = end;
+    }
+    unreadable.push_back(!good);
+  }
+  return unreadable;
+}
 
 bool usable(const Eigen::Vector3f& v) noexcept {
   return v.allFinite() && v.cwiseAbs().maxCoeff() < kLargestCoordinate_m;
@@ -66,7 +91,8 @@ std::vector<CornerNormals> smooth_normals(const Mesh& mesh, double crease_rad) {
                                     [i](const Corner& corner) { return corner.triangle == i; });
       Vector3f sum = Vector3f::Zero();
       for (const Corner& corner : corners)
-        if (corner.normal.dot(own->normal) >= crease_cosine) sum += corner.angle * corner.normal;
+        if (const float cosine = corner.normal.dot(own->normal); std::abs(cosine) >= crease_cosine)
+          sum += std::copysign(corner.angle, cosine) * corner.normal;  // a face may run backwards
       normals[i][c] = sum.normalized();
     }
   }
@@ -89,6 +115,9 @@ Mesh load_obj(const std::string& path, MeshReport& report) {
   mesh.vertices.reserve(count);
   for (std::size_t i = 0; i < count; ++i)
     mesh.vertices.emplace_back(coordinates[3 * i], coordinates[3 * i + 1], coordinates[3 * i + 2]);
+  const std::vector<bool> unreadable = unreadable_vertices(path);
+  for (std::size_t i = 0; i < std::min(count, unreadable.size()); ++i)
+    if (unreadable[i]) mesh.vertices[i].setConstant(std::numeric_limits<float>::quiet_NaN());
 
   for (const auto& shape : reader.GetShapes()) {
     const auto& corners = shape.mesh.indices;

@@ -71,7 +71,7 @@ class Run:
         self.open_loop = report.get("open_loop") is True
         self.passage = self._section(report, "pass")
         self.pointing = self._section(report, "pointing")
-        self.ifov_rad = self.figure(report, "ifov_rad") or DEFAULT_IFOV_RAD
+        self.ifov_rad = self.figure(self._section(report, "camera"), "ifov_rad") or DEFAULT_IFOV_RAD
 
     @staticmethod
     def _section(report, key):

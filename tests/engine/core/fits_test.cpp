@@ -1,0 +1,89 @@
+#include "engine/core/fits.h"
+
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+#include <stdexcept>
+
+#include <gtest/gtest.h>
+
+#include "tests/support/temp_file.h"
+
+namespace engine {
+namespace {
+
+using test_support::TempFile;
+
+DnImage ramp(int width, int height) {
+  DnImage image(width, height);
+  for (std::size_t i = 0; i < image.pixels().size(); ++i)
+    image.pixels()[i] = static_cast<std::uint16_t>(i * 257U);
+  return image;
+}
+
+std::string bytes_of(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+TEST(Fits, ReadsBackWhatItWrote) {
+  const TempFile file("image.fits");
+  for (const auto& [width, height] : {std::pair(1, 1), {37, 11}, {512, 256}}) {
+    const DnImage image = ramp(width, height);  // all sixteen bits
+    write_fits(file.path(), image, {});
+    const DnImage back = read_fits(file.path());
+    ASSERT_EQ(back.width(), width);
+    ASSERT_EQ(back.height(), height);
+    EXPECT_TRUE(std::ranges::equal(back.pixels(), image.pixels()));
+  }
+}
+
+TEST(Fits, WritesItsCards) {
+  const TempFile file("cards.fits");
+  write_fits(file.path(), ramp(4, 4),
+             {{"EXPTIME", 0.001, "[s] exposure"},
+              {"SEED", 42LL, ""},
+              {"NAME", std::string("flyby"), "scenario"},
+              {"TARGET PIXEL U", 512.25, "a long keyword"}});
+  const std::string bytes = bytes_of(file.path());
+  EXPECT_EQ(bytes.size() % 2880, 0U);
+  EXPECT_NE(bytes.find("EXPTIME ="), std::string::npos);
+  EXPECT_NE(bytes.find("[s] exposure"), std::string::npos);
+  EXPECT_NE(bytes.find("'flyby"), std::string::npos);
+  EXPECT_NE(bytes.find("HIERARCH TARGET PIXEL U"), std::string::npos);
+}
+
+TEST(Fits, ReplacesAnOldFileAndLeavesNoPart) {
+  const TempFile file("old.fits", "something else");
+  write_fits(file.path(), ramp(5, 5), {});
+  EXPECT_EQ(read_fits(file.path()).width(), 5);
+  EXPECT_FALSE(std::ifstream(file.path() + ".part").good());
+}
+
+TEST(Fits, TakesNamesLiterally) {
+  // cfitsio's extended syntax would cut a region out of this one.
+  const TempFile file("a[1:2,1:2].fits");
+  write_fits(file.path(), ramp(8, 8), {});
+  EXPECT_EQ(read_fits(file.path()).width(), 8);
+}
+
+TEST(Fits, RefusesWhatIsNoImageOfItsKind) {
+  EXPECT_THROW(static_cast<void>(read_fits("/nowhere/x.fits")), std::runtime_error);
+  EXPECT_THROW(write_fits("/nowhere/x.fits", ramp(2, 2), {}), std::runtime_error);
+  const TempFile text("text.fits", "not a FITS file at all");
+  EXPECT_THROW(static_cast<void>(read_fits(text.path())), std::runtime_error);
+  // A header that claims more than there is, and one that claims too much.
+  const TempFile whole("whole.fits");
+  write_fits(whole.path(), ramp(64, 64), {});
+  std::string bytes = bytes_of(whole.path());
+  const TempFile cut("cut.fits", std::string_view(bytes).substr(0, 2880));
+  EXPECT_THROW(static_cast<void>(read_fits(cut.path())), std::runtime_error);
+  const auto at = bytes.find("NAXIS1  =                   64");
+  ASSERT_NE(at, std::string::npos);
+  bytes.replace(at, 30, "NAXIS1  =           2000000000");
+  const TempFile huge("huge.fits", bytes);
+  EXPECT_THROW(static_cast<void>(read_fits(huge.path())), std::runtime_error);
+}
+
+}  // namespace
+}  // namespace engine

@@ -1,0 +1,215 @@
+#include "engine/scene/snapshot_builder.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "tests/support/csv.h"
+#include "tests/support/scenes.h"
+
+namespace engine {
+namespace {
+
+using Eigen::Vector3d;
+using test_support::Csv;
+using test_support::Flyby;
+using test_support::kClosestOfPass3_s;
+
+constexpr double kMillisecond_s = 1e-3;
+
+SceneSpec spec_of(const Flyby& flyby, LightPath path = LightPath::kApparent) {
+  SceneSpec spec;
+  spec.epoch = flyby.epoch;
+  spec.seed = 42;
+  spec.light_path = path;
+  spec.sky_w_m2_sr = 5e-7;
+  return spec;
+}
+
+CameraAttitude tracking(const Flyby& flyby, SimTime t, LightPath path) {
+  return look_along(
+      sight_line(flyby.camera, flyby.target, flyby.epoch + t.time_since_epoch(), path).apparent);
+}
+
+/// 1 ms about `middle_s`, the target held on the boresight all the time.
+Shot tracked_shot(const Flyby& flyby, double middle_s, LightPath path = LightPath::kApparent) {
+  Shot shot;
+  shot.sequence = 7;
+  shot.exposure = from_seconds(kMillisecond_s);
+  shot.shutter_open = sim_time(middle_s) - shot.exposure / 2;
+  shot.attitude.open = tracking(flyby, shot.shutter_open, path);
+  shot.attitude.middle = tracking(flyby, shot.shutter_open + shot.exposure / 2, path);
+  shot.attitude.close = tracking(flyby, shot.shutter_open + shot.exposure, path);
+  return shot;
+}
+
+TEST(SnapshotBuilder, PutsATrackedTargetOnTheBoresightWithoutSmear) {
+  const Flyby flyby;
+  for (const LightPath path : {LightPath::kGeometric, LightPath::kApparent}) {
+    const SnapshotBuilder builder(spec_of(flyby, path), flyby.camera, flyby.target);
+    for (double t_s = kClosestOfPass3_s - 15.0; t_s < kClosestOfPass3_s + 16.0; t_s += 3.0) {
+      const Snapshot s = builder.build(tracked_shot(flyby, t_s, path));
+      // A rounding of the direction, 1e-16 rad, times 7e5 px per rad.
+      EXPECT_NEAR(s.target_px.u, 512.0, 1e-9) << t_s;
+      EXPECT_NEAR(s.target_px.v, 512.0, 1e-9) << t_s;
+      EXPECT_NEAR(s.smear_px.u, 0.0, 1e-9) << t_s;
+      EXPECT_NEAR(s.smear_px.v, 0.0, 1e-9) << t_s;
+      EXPECT_FALSE(s.roll_is_fallback);
+    }
+  }
+}
+
+TEST(SnapshotBuilder, SmearsWhatIsNotTracked) {
+  const Flyby flyby;
+  const Csv windows("range_windows_15d.csv");
+  const SnapshotBuilder builder(spec_of(flyby), flyby.camera, flyby.target);
+  for (const Csv::Row& row : windows.rows()) {
+    Shot shot = tracked_shot(flyby, row.number("tca_s"));
+    shot.attitude.open = shot.attitude.close = shot.attitude.middle;
+    const Snapshot s = builder.build(shot);
+    // The reference's rate is geometric; light time makes it slower by range rate over c, nothing
+    // at the closest approach, and aberration changes it by v/c, 5e-5. 1 ms is short: 1e-4 of it.
+    const double want_px = row.number("pixel_drift_max_px_s") * kMillisecond_s;
+    EXPECT_NEAR(std::hypot(s.smear_px.u, s.smear_px.v) / want_px, 1.0, 3e-4) << row.text("idx");
+  }
+}
+
+TEST(SnapshotBuilder, CameraSeesTheTargetsCentreAlongItsBoresight) {
+  // Aberration tilts the camera's view by 17 px and more; the rays must run along the light's path.
+  const Flyby flyby;
+  const SnapshotBuilder builder(spec_of(flyby), flyby.camera, flyby.target);
+  const Snapshot s = builder.build(tracked_shot(flyby, kClosestOfPass3_s));
+  EXPECT_NEAR(s.camera.m.norm(), s.range_m, 1e-8);
+  const Vector3d boresight = s.body_from_camera.matrix.col(2);
+  // In pixels: 1e-9 rad is .0007.
+  EXPECT_LT(angle_between_rad(boresight, -s.camera.m), 1e-9);
+  EXPECT_NEAR(s.body_from_camera.matrix.determinant(), 1.0, 1e-14);
+  EXPECT_EQ(s.sequence, 7U);
+  EXPECT_EQ(s.seed, 42U);
+  EXPECT_EQ(s.background_w_m2_sr, 5e-7);
+}
+
+TEST(SnapshotBuilder, BodyPointsToTheNadir) {
+  // Camera and Sun in body axes: their z is minus their height above the target's horizon.
+  const Flyby flyby;
+  const SnapshotBuilder builder(spec_of(flyby, LightPath::kGeometric), flyby.camera, flyby.target);
+  for (double t_s = 0.0; t_s < 6000.0; t_s += 500.0) {
+    const Snapshot s = builder.build(tracked_shot(flyby, t_s, LightPath::kGeometric));
+    const Epoch now = flyby.at(t_s);
+    const OrbitState target = flyby.target.at(now);
+    const Vector3d up = target.position.m.normalized();
+    const Vector3d to_camera = flyby.camera.at(now).position.m - target.position.m;
+    // 14 roundings of 1e7 m.
+    EXPECT_NEAR(s.camera.m.z(), -to_camera.dot(up), 2e-8);
+    const Vector3d ahead = target.position.m.cross(target.velocity.m_s).cross(target.position.m);
+    EXPECT_NEAR(s.camera.m.x(), to_camera.dot(ahead.normalized()), 2e-8);
+    const Vector3d to_sun = sun_position(SunModel::kErfa, now).m - target.position.m;
+    EXPECT_NEAR(s.sun.toward.unit.z(), -to_sun.normalized().dot(up), 1e-12);
+    EXPECT_NEAR(s.phase_angle_rad, angle_between_rad(to_sun, to_camera), 1e-12);
+  }
+}
+
+TEST(SnapshotBuilder, TurnsTheBodyByItsOffsets) {
+  const Flyby flyby;
+  SceneSpec spec = spec_of(flyby);
+  const Shot shot = tracked_shot(flyby, kClosestOfPass3_s);
+  const Snapshot plain = SnapshotBuilder(spec, flyby.camera, flyby.target).build(shot);
+  spec.target_offsets = {0.1, -0.2, 0.3};
+  const Snapshot turned = SnapshotBuilder(spec, flyby.camera, flyby.target).build(shot);
+  const Eigen::Matrix3d offset = body_offset(spec.target_offsets).matrix;
+  EXPECT_LT((turned.camera.m - offset * plain.camera.m).norm(), 1e-9);
+  EXPECT_LT((turned.sun.toward.unit - offset * plain.sun.toward.unit).norm(), 1e-14);
+  EXPECT_EQ(turned.target_px.u, plain.target_px.u);
+}
+
+TEST(SnapshotBuilder, PhaseAnglesAreThoseOfTheReference) {
+  const Flyby flyby;
+  const Csv windows("range_windows_15d.csv");
+  const SnapshotBuilder builder(spec_of(flyby, LightPath::kGeometric), flyby.camera, flyby.target);
+  for (const Csv::Row& row : windows.rows()) {
+    const Snapshot s =
+        builder.build(tracked_shot(flyby, row.number("tca_s"), LightPath::kGeometric));
+    // Four decimals are printed; the time, rounded to a microsecond, turns the line by 2e-5 deg.
+    EXPECT_NEAR(s.phase_angle_rad / kDegree, row.number("phase_angle_at_tca_deg"), 1e-4);
+  }
+}
+
+TEST(SnapshotBuilder, SwitchesTheSunOffInTheShadow) {
+  const Flyby flyby;
+  const SnapshotBuilder builder(spec_of(flyby), flyby.camera, flyby.target);
+  int dark = 0;
+  int lit = 0;
+  for (double t_s = 0.0; t_s < 6000.0; t_s += 100.0) {
+    const Snapshot s = builder.build(tracked_shot(flyby, t_s));
+    const Epoch now = flyby.at(t_s);
+    const Vector3d target = flyby.target.at(now).position.m;
+    const Vector3d to_sun = sun_position(SunModel::kErfa, now).m.normalized();
+    const double off_axis_m = (target - target.dot(to_sun) * to_sun).norm();
+    if (target.dot(to_sun) < 0.0 && off_axis_m < kEarthRadius_m - 2e4) {
+      EXPECT_EQ(s.sun.irradiance_w_m2, 0.0) << t_s;
+      ++dark;
+    } else if (target.dot(to_sun) > 0.0) {
+      // Perihelion: .98336 au, and the target's own 7000 km on top.
+      EXPECT_NEAR(s.sun.irradiance_w_m2, 623.677 / (0.98336 * 0.98336), 0.2) << t_s;
+      ++lit;
+    }
+    EXPECT_NEAR(s.sun.toward.unit.norm(), 1.0, 1e-14);
+  }
+  EXPECT_GT(dark, 10);
+  EXPECT_GT(lit, 20);
+}
+
+TEST(SnapshotBuilder, LightsFromBelowOnTheDaySide) {
+  const Flyby flyby;
+  SceneSpec spec = spec_of(flyby);
+  const auto earthshine = [&](EarthshineModel model, double t_s) {
+    spec.earth.earthshine = model;
+    return SnapshotBuilder(spec, flyby.camera, flyby.target)
+        .build(tracked_shot(flyby, t_s))
+        .earthshine;
+  };
+  for (double t_s = 0.0; t_s < 6000.0; t_s += 300.0) {
+    EXPECT_EQ(earthshine(EarthshineModel::kNone, t_s).irradiance_w_m2, 0.0);
+    const Lamp lamp = earthshine(EarthshineModel::kPaperLamp, t_s);
+    EXPECT_NEAR(lamp.toward.unit.z(), 1.0, 1e-12);
+    EXPECT_NEAR(lamp.irradiance_w_m2, 0.3 * 623.677 / (0.98336 * 0.98336), 0.06);
+    const Lamp vector = earthshine(EarthshineModel::kVector, t_s);
+    EXPECT_LE(vector.irradiance_w_m2, lamp.irradiance_w_m2);
+    // Light comes from the cap, whose edge is 70 deg from the nadir.
+    if (vector.irradiance_w_m2 > 0.0) {
+      EXPECT_GT(vector.toward.unit.z(), std::cos(71.0 * kDegree));
+    }
+  }
+}
+
+TEST(SnapshotBuilder, PutsWhatIsBehindTheCameraFarOutsideAndFinite) {
+  const Flyby flyby;
+  const SnapshotBuilder builder(spec_of(flyby), flyby.camera, flyby.target);
+  Shot shot = tracked_shot(flyby, kClosestOfPass3_s);
+  for (CameraAttitude* a : {&shot.attitude.open, &shot.attitude.middle, &shot.attitude.close})
+    *a = look_along({-a->axes.matrix.row(2).transpose()});
+  const Snapshot s = builder.build(shot);
+  EXPECT_TRUE(std::isfinite(s.target_px.u) && std::isfinite(s.target_px.v));
+  EXPECT_LT(s.target_px.u, -1e6);
+  EXPECT_TRUE(std::isfinite(s.smear_px.u) && std::isfinite(s.smear_px.v));
+}
+
+TEST(SnapshotBuilder, KnowsTheEarthBehindTheTarget) {
+  const Flyby flyby;
+  const SnapshotBuilder builder(spec_of(flyby, LightPath::kGeometric), flyby.camera, flyby.target);
+  // background_intervals.csv, window 3: Earth from 309773.16 to 309790.44 s.
+  EXPECT_FALSE(builder.build(tracked_shot(flyby, 309765.0)).earth_behind);
+  EXPECT_TRUE(builder.build(tracked_shot(flyby, 309780.0)).earth_behind);
+  EXPECT_FALSE(builder.build(tracked_shot(flyby, 309795.0)).earth_behind);
+}
+
+TEST(SnapshotBuilder, PassesTheFallbackOfTheRollOn) {
+  const Flyby flyby;
+  const SnapshotBuilder builder(spec_of(flyby), flyby.camera, flyby.target);
+  Shot shot = tracked_shot(flyby, kClosestOfPass3_s);
+  shot.attitude.middle.roll_is_fallback = true;
+  EXPECT_TRUE(builder.build(shot).roll_is_fallback);
+}
+
+}  // namespace
+}  // namespace engine

@@ -1,0 +1,768 @@
+#include "hil/frame_loop.h"
+
+#include <algorithm>
+#include <optional>
+#include <thread>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "tests/support/fakes.h"
+
+namespace {
+
+using engine::Duration;
+using engine::Error;
+using engine::Fault;
+using engine::sim_time;
+using engine::SimTime;
+using engine::Status;
+using fakes::IdealPointing;
+using hil::Command;
+using hil::CommandKind;
+using hil::CommandRecord;
+using hil::Frame;
+using hil::FrameLoop;
+using hil::FrameRecord;
+using hil::LoopReport;
+using hil::LoopSpec;
+using hil::WhenBusy;
+
+constexpr Duration kPeriod{100'000'000};
+constexpr Duration kMillisecond{1'000'000};
+const SimTime kStart = sim_time(1000.0);
+
+LoopSpec small_loop(std::uint64_t frames) {
+  LoopSpec spec;
+  spec.start = kStart;
+  spec.period = kPeriod;
+  spec.frames = frames;
+  spec.width_px = 8;
+  spec.height_px = 2;
+  return spec;
+}
+
+LoopSpec lockstep_loop(std::uint64_t frames) {
+  LoopSpec spec = small_loop(frames);
+  spec.when_busy = WhenBusy::kWait;
+  // Only a loop that is wrong waits this long.
+  spec.answer_timeout = std::chrono::seconds(20);
+  spec.send_timeout = std::chrono::seconds(20);
+  return spec;
+}
+
+/// Rehearsals keep every frame, so that counts do not depend on how threads are scheduled.
+LoopSpec patient_loop(std::uint64_t frames) {
+  LoopSpec spec = small_loop(frames);
+  spec.when_busy = WhenBusy::kWait;
+  return spec;
+}
+
+SimTime opening(std::uint64_t k) { return kStart + kPeriod * static_cast<std::int64_t>(k); }
+
+void expect_adds_up(const LoopReport& report) {
+  EXPECT_EQ(report.due, report.sent + report.skipped + report.dropped + report.faults);
+}
+
+template <class Ring>
+auto drain(Ring& ring) {
+  using Record =
+      std::conditional_t<std::is_same_v<Ring, FrameLoop::FrameRing>, FrameRecord, CommandRecord>;
+  std::vector<Record> records;
+  for (Record record; ring.pop(record);) records.push_back(record);
+  return records;
+}
+
+Command trim_answer(const Frame& frame, double trim_rad = 0.0) {
+  Command command;
+  command.sequence = frame.sequence;
+  command.answers_frame = frame.sequence;
+  command.kind = CommandKind::kTrim;
+  command.trim_offset_rad = {trim_rad, 0.0};
+  command.reference = frame.shutter_open;
+  return command;
+}
+
+// ---- the grid -------------------------------------------------------------------------------
+
+TEST(FrameLoop, OpensEveryShutterOnTheGridAndSendsEveryFrameInOrder) {
+  hil::ManualClock clock(kStart - kPeriod);
+  IdealPointing pointing;
+  std::vector<SimTime> opened_at;
+  fakes::PixelGenerator generator([&](const engine::Shot&) { opened_at.push_back(clock.now()); });
+  fakes::Sink sink;
+  fakes::SilentSource source;
+  FrameLoop loop(patient_loop(40), clock, pointing, generator, sink, source);
+  const LoopReport report = loop.run({});
+  EXPECT_EQ(report.due, 40U);
+  EXPECT_EQ(report.sent, 40U);
+  EXPECT_EQ(report.late, 0U);
+  EXPECT_EQ(report.records_lost, 0U);
+  expect_adds_up(report);
+  const auto records = drain(loop.frames());
+  ASSERT_EQ(records.size(), 40U);
+  ASSERT_EQ(sink.sequences().size(), 40U);
+  for (std::uint64_t k = 0; k < 40; ++k) {
+    EXPECT_EQ(records[k].sequence, k);
+    EXPECT_EQ(records[k].shutter_open, opening(k));
+    EXPECT_EQ(records[k].late, Duration{});
+    EXPECT_EQ(records[k].skipped_before, 0U);
+    EXPECT_TRUE(records[k].handed_over);
+    EXPECT_EQ(generator.shots()[k].shutter_open, opening(k));
+    EXPECT_EQ(generator.shots()[k].exposure, kMillisecond);
+    EXPECT_EQ(opened_at[k], opening(k));
+    EXPECT_EQ(sink.sequences()[k], k);
+  }
+}
+
+TEST(FrameLoop, FrameCarriesWhatTheCameraKnowsOfItself) {
+  hil::ManualClock clock(kStart - kPeriod);
+  IdealPointing pointing(3e-4);
+  fakes::PixelGenerator generator;
+  fakes::Device device([](const Frame& frame) {
+    EXPECT_EQ(frame.shutter_open, opening(frame.sequence));
+    EXPECT_EQ(frame.exposure, kMillisecond);
+    EXPECT_EQ(frame.bits, 11);
+    EXPECT_EQ(frame.pixels->width(), 8);
+    EXPECT_EQ(frame.pixels->height(), 2);
+    // What the frame shows and the trim read back belong to the same instant.
+    EXPECT_EQ(fakes::seen_in(frame), 3e-4 + frame.trim_rad[0]);
+    return trim_answer(frame, -1e-5 * static_cast<double>(frame.sequence + 1));
+  });
+  FrameLoop loop(lockstep_loop(20), clock, pointing, generator, device, device);
+  EXPECT_EQ(loop.run({}).sent, 20U);
+  for (const FrameRecord& r : drain(loop.frames()))
+    EXPECT_EQ(r.trim_rad[0], -1e-5 * static_cast<double>(r.sequence)) << r.sequence;
+}
+
+/// A loop whose generator takes `stall` for frame `at`, once.
+struct Stalled {
+  LoopReport report;
+  std::vector<FrameRecord> records;
+  std::vector<SimTime> opened_at;
+  int pointing_steps_back = 0;
+};
+Stalled run_stalled(std::uint64_t frames, std::uint64_t at, Duration stall) {
+  Stalled out;
+  hil::ManualClock clock(kStart - kPeriod);
+  IdealPointing pointing;
+  fakes::PixelGenerator generator([&](const engine::Shot& shot) {
+    out.opened_at.push_back(clock.now());
+    if (shot.sequence == at) clock.pass(stall);
+  });
+  fakes::Sink sink;
+  fakes::SilentSource source;
+  FrameLoop loop(patient_loop(frames), clock, pointing, generator, sink, source);
+  out.report = loop.run({});
+  out.records = drain(loop.frames());
+  out.pointing_steps_back = pointing.steps_back();
+  return out;
+}
+
+// A stall of 3.5 periods during frame k is over at k + 3.5: k + 1, k + 2 and k + 3 have gone by.
+TEST(FrameLoop, AStallOfThreeAndAHalfPeriodsLosesThreeFramesAndNothingIsCaughtUp) {
+  const Stalled run = run_stalled(20, 5, kPeriod * 7 / 2);
+  EXPECT_EQ(run.report.due, 20U);
+  EXPECT_EQ(run.report.skipped, 3U);
+  EXPECT_EQ(run.report.sent, 17U);
+  EXPECT_EQ(run.report.late, 0U);
+  expect_adds_up(run.report);
+  EXPECT_EQ(run.pointing_steps_back, 0);
+  std::vector<std::uint64_t> sequences;
+  for (std::size_t i = 0; i < run.records.size(); ++i) {
+    const FrameRecord& r = run.records[i];
+    sequences.push_back(r.sequence);
+    // No phase error and no burst: later frames stand on the grid of before.
+    EXPECT_EQ(r.shutter_open, opening(r.sequence));
+    EXPECT_EQ(run.opened_at[i], opening(r.sequence));
+    EXPECT_EQ(r.late, Duration{});
+    EXPECT_EQ(r.skipped_before, r.sequence == 9 ? 3U : 0U);
+  }
+  EXPECT_EQ(sequences, (std::vector<std::uint64_t>{0, 1, 2, 3, 4, 5, 9, 10, 11, 12, 13, 14, 15, 16,
+                                                   17, 18, 19}));
+  EXPECT_EQ(run.records[5].busy, kPeriod * 7 / 2);
+}
+
+TEST(FrameLoop, AStallLosesExactlyThePeriodsThatWentBy) {
+  struct Case {
+    Duration stall;
+    std::uint64_t skipped;
+    Duration late;  ///< of the next frame
+  };
+  // A shutter that can still open within a millisecond of its time opens.
+  const std::vector<Case> cases = {
+      {Duration{}, 0, {}},
+      {kPeriod / 2, 0, {}},
+      {kPeriod - Duration(1), 0, {}},
+      {kPeriod, 0, {}},
+      {kPeriod + kMillisecond / 2, 0, kMillisecond / 2},
+      {kPeriod + kMillisecond, 0, kMillisecond},
+      {kPeriod + kMillisecond + Duration(1), 1, {}},
+      {kPeriod * 2 - Duration(1), 1, {}},
+      {kPeriod * 2, 1, {}},
+      {kPeriod * 2 + Duration(1), 2, {}},
+      {kPeriod * 7 / 2, 3, {}},
+      {kPeriod * 9, 8, {}},
+      {kPeriod * 10, 9, {}},
+      {kPeriod * 14 + Duration(1), 14, {}},  // the rest of the run
+      {kPeriod * 1000, 14, {}},
+  };
+  for (const Case& c : cases) {
+    SCOPED_TRACE(c.stall.count());
+    const Stalled run = run_stalled(20, 5, c.stall);
+    EXPECT_EQ(run.report.due, 20U);
+    EXPECT_EQ(run.report.skipped, c.skipped);
+    EXPECT_EQ(run.report.sent, 20U - c.skipped);
+    expect_adds_up(run.report);
+    EXPECT_EQ(run.pointing_steps_back, 0);
+    if (c.skipped == 14) continue;
+    ASSERT_GT(run.records.size(), 6U);
+    EXPECT_EQ(run.records[6].sequence, 6U + c.skipped);
+    EXPECT_EQ(run.records[6].late, c.late);
+  }
+}
+
+TEST(FrameLoop, ALoopThatStartsLateSkipsWhatIsOverAndCountsIt) {
+  hil::ManualClock clock(kStart + kPeriod * 5 / 2);
+  IdealPointing pointing;
+  fakes::PixelGenerator generator;
+  fakes::Sink sink;
+  fakes::SilentSource source;
+  FrameLoop loop(patient_loop(10), clock, pointing, generator, sink, source);
+  const LoopReport report = loop.run({});
+  EXPECT_EQ(report.skipped, 3U);
+  EXPECT_EQ(report.due, 10U);
+  expect_adds_up(report);
+  ASSERT_EQ(sink.sequences().size(), 7U);
+  EXPECT_EQ(sink.sequences().front(), 3U);
+}
+
+TEST(FrameLoop, CountsFramesThatWereWokenOverAMillisecondLate) {
+  for (const Duration oversleep : {kMillisecond, kMillisecond + Duration(1)}) {
+    fakes::HookedClock clock(kStart - kPeriod, {}, oversleep);
+    IdealPointing pointing;
+    fakes::PixelGenerator generator;
+    fakes::Sink sink;
+    fakes::SilentSource source;
+    FrameLoop loop(patient_loop(10), clock, pointing, generator, sink, source);
+    const LoopReport report = loop.run({});
+    EXPECT_EQ(report.sent, 10U);
+    EXPECT_EQ(report.late, oversleep > kMillisecond ? 10U : 0U);
+    expect_adds_up(report);
+    for (const FrameRecord& r : drain(loop.frames())) EXPECT_EQ(r.late, oversleep);
+  }
+}
+
+TEST(FrameLoop, ASecondOfStallsAtRandomStillAddsUp) {
+  std::uint64_t state = 1;
+  hil::ManualClock clock(kStart - kPeriod);
+  IdealPointing pointing;
+  fakes::PixelGenerator generator([&](const engine::Shot&) {
+    state = state * 6364136223846793005ULL + 1442695040888963407ULL;
+    clock.pass(Duration(static_cast<std::int64_t>((state >> 33) % 250'000'000)));
+  });
+  fakes::Sink sink([](const Frame& frame, Duration) -> Status {
+    if (frame.sequence % 3 == 0) return Error{Fault::kDisconnected, 0, "test"};
+    return engine::Done{};
+  });
+  fakes::SilentSource source;
+  FrameLoop loop(patient_loop(200), clock, pointing, generator, sink, source);
+  const LoopReport report = loop.run({});
+  EXPECT_EQ(report.due, 200U);
+  EXPECT_GT(report.skipped, 0U);
+  EXPECT_GT(report.faults, 0U);
+  expect_adds_up(report);
+  EXPECT_EQ(pointing.steps_back(), 0);
+  std::uint64_t next = 0;
+  for (const FrameRecord& r : drain(loop.frames())) {
+    EXPECT_EQ(r.sequence, next + r.skipped_before);
+    next = r.sequence + 1;
+  }
+}
+
+// ---- the link -------------------------------------------------------------------------------
+
+TEST(FrameLoop, ASinkThatRefusesCountsFaultsAndRemembersTheLast) {
+  hil::ManualClock clock(kStart - kPeriod);
+  IdealPointing pointing;
+  fakes::PixelGenerator generator;
+  fakes::Sink sink([](const Frame& frame, Duration) -> Status {
+    if (frame.sequence % 4 == 1)
+      return Error{Fault::kRejected, static_cast<int>(frame.sequence), "test"};
+    return engine::Done{};
+  });
+  fakes::SilentSource source;
+  FrameLoop loop(patient_loop(20), clock, pointing, generator, sink, source);
+  const LoopReport report = loop.run({});
+  EXPECT_EQ(report.faults, 5U);
+  EXPECT_EQ(report.sent, 15U);
+  EXPECT_EQ(report.last_fault.fault, Fault::kRejected);
+  EXPECT_EQ(report.last_fault.code, 17);
+  EXPECT_STREQ(report.last_fault.step, "test");
+  expect_adds_up(report);
+}
+
+TEST(FrameLoop, ASinkThatHoldsEverySlotCostsFramesButNeverDelaysTheLoop) {
+  constexpr std::uint64_t kFrames = 50;
+  constexpr std::uint64_t kSlots = 4;
+  std::counting_semaphore<> gate{0};
+  hil::ManualClock clock(kStart - kPeriod);
+  IdealPointing pointing;
+  fakes::PixelGenerator generator;
+  fakes::Sink sink([&gate](const Frame&, Duration) -> Status {
+    gate.acquire();
+    return engine::Done{};
+  });
+  fakes::SilentSource source;
+  FrameLoop loop(small_loop(kFrames), clock, pointing, generator, sink, source);
+  LoopReport report;
+  std::jthread runner([&] { report = loop.run({}); });
+  // The gate opens only when the loop is through: were it held up by the sink, nobody would.
+  std::vector<FrameRecord> records;
+  while (records.size() < kFrames) {
+    if (FrameRecord r; loop.frames().pop(r)) {
+      records.push_back(r);
+    } else {
+      std::this_thread::yield();
+    }
+  }
+  gate.release(kFrames);
+  runner.join();
+  EXPECT_EQ(report.due, kFrames);
+  EXPECT_EQ(report.sent, kSlots);
+  EXPECT_EQ(report.dropped, kFrames - kSlots);
+  EXPECT_EQ(report.skipped, 0U);
+  EXPECT_EQ(report.late, 0U);
+  expect_adds_up(report);
+  for (const FrameRecord& r : records) {
+    EXPECT_EQ(r.handed_over, r.sequence < kSlots);
+    EXPECT_EQ(r.late, Duration{});
+    EXPECT_EQ(r.shutter_open, opening(r.sequence));
+  }
+  EXPECT_EQ(sink.sequences(), (std::vector<std::uint64_t>{0, 1, 2, 3}));
+}
+
+TEST(FrameLoop, ARehearsalWaitsForItsSinkAndKeepsEveryFrame) {
+  constexpr std::uint64_t kFrames = 50;
+  std::counting_semaphore<> gate{0};
+  hil::ManualClock clock(kStart - kPeriod);
+  IdealPointing pointing;
+  fakes::PixelGenerator generator;
+  fakes::Sink sink([&gate](const Frame& frame, Duration) -> Status {
+    gate.acquire();
+    // The slot is still the sender's: nobody has written into it meanwhile.
+    EXPECT_EQ(frame.shutter_open, opening(frame.sequence));
+    return engine::Done{};
+  });
+  fakes::SilentSource source;
+  FrameLoop loop(patient_loop(kFrames), clock, pointing, generator, sink, source);
+  LoopReport report;
+  std::jthread runner([&] { report = loop.run({}); });
+  // The first four fill the slots. A loop that did not wait would run on while we look for a fifth.
+  std::vector<FrameRecord> records;
+  for (int looks_for_a_fifth = 0; records.size() <= 4 && looks_for_a_fifth < 20'000;) {
+    if (FrameRecord r; loop.frames().pop(r)) {
+      records.push_back(r);
+    } else {
+      std::this_thread::yield();
+      if (records.size() == 4) ++looks_for_a_fifth;
+    }
+  }
+  EXPECT_EQ(records.size(), 4U);
+  gate.release(kFrames);
+  runner.join();
+  EXPECT_EQ(report.sent, kFrames);
+  EXPECT_EQ(report.dropped, 0U);
+  expect_adds_up(report);
+  for (std::uint64_t k = 0; k < kFrames; ++k) EXPECT_EQ(sink.sequences()[k], k);
+}
+
+TEST(FrameLoop, NobodyWritesIntoAFrameWhileTheSinkHasIt) {
+  hil::ManualClock clock(kStart - kPeriod);
+  IdealPointing pointing;
+  fakes::PixelGenerator generator;
+  int wrong = 0;
+  fakes::Sink sink([&](const Frame& frame, Duration) -> Status {
+    // The loop runs ahead as far as it can meanwhile.
+    for (int i = 0; i < 100; ++i) {
+      if (frame.pixels->pixels().back() != frame.sequence) ++wrong;
+      std::this_thread::yield();
+    }
+    return engine::Done{};
+  });
+  fakes::SilentSource source;
+  FrameLoop loop(patient_loop(200), clock, pointing, generator, sink, source);
+  EXPECT_EQ(loop.run({}).sent, 200U);
+  EXPECT_EQ(wrong, 0);
+}
+
+TEST(FrameLoop, AnObserverThatNeverLooksCostsRecordsAndNoFrames) {
+  hil::ManualClock clock(kStart - kPeriod);
+  IdealPointing pointing;
+  fakes::PixelGenerator generator;
+  fakes::Sink sink;
+  fakes::SilentSource source;
+  FrameLoop loop(patient_loop(300), clock, pointing, generator, sink, source);
+  const LoopReport report = loop.run({});
+  EXPECT_EQ(report.sent, 300U);
+  EXPECT_EQ(report.records_lost, 300U - 256U);
+  const auto records = drain(loop.frames());
+  ASSERT_EQ(records.size(), 256U);
+  EXPECT_EQ(records.back().sequence, 255U);
+}
+
+// ---- commands -------------------------------------------------------------------------------
+
+// The documented latency: a command that answers frame k shows in frame k + 1.
+TEST(FrameLoop, InLockstepTheAnswerToAFrameShowsInTheNext) {
+  constexpr std::uint64_t kFrames = 30;
+  hil::ManualClock clock(kStart - kPeriod);
+  IdealPointing pointing;
+  fakes::PixelGenerator generator;
+  fakes::Device device([](const Frame& frame) {
+    return trim_answer(frame, 1.0 + static_cast<double>(frame.sequence));
+  });
+  const LoopSpec spec = lockstep_loop(kFrames);
+  FrameLoop loop(spec, clock, pointing, generator, device, device);
+  const LoopReport report = loop.run({});
+  EXPECT_EQ(report.sent, kFrames);
+  EXPECT_EQ(report.commands, kFrames);
+  EXPECT_FALSE(report.answer_missing);
+  expect_adds_up(report);
+
+  // Frame k shows the trim that answered frame k - 1, during its whole exposure.
+  for (const engine::Shot& shot : generator.shots()) {
+    for (const auto* a : {&shot.attitude.open, &shot.attitude.middle, &shot.attitude.close})
+      EXPECT_EQ(a->axes.matrix(0, 0), static_cast<double>(shot.sequence)) << shot.sequence;
+  }
+  // Up to the slot the old trim holds; then the new one; then the exposure.
+  std::vector<IdealPointing::Event> expected;
+  for (std::uint64_t k = 0; k < kFrames; ++k) {
+    using What = IdealPointing::What;
+    expected.push_back({What::kAttitude, opening(k) - spec.command_lead, 0});
+    if (k > 0) expected.push_back({What::kApply, {}, k - 1});
+    expected.push_back({What::kAttitude, opening(k), 0});
+    expected.push_back({What::kAttitude, opening(k) + spec.exposure / 2, 0});
+    expected.push_back({What::kAttitude, opening(k) + spec.exposure, 0});
+  }
+  expected.push_back({IdealPointing::What::kApply, {}, kFrames - 1});
+  EXPECT_EQ(pointing.events(), expected);
+  EXPECT_EQ(pointing.steps_back(), 0);
+
+  // The record says the same, the last answer included.
+  const auto records = drain(loop.commands());
+  ASSERT_EQ(records.size(), kFrames);
+  for (std::uint64_t k = 0; k < kFrames; ++k) {
+    EXPECT_EQ(records[k].command.answers_frame, k);
+    EXPECT_EQ(records[k].frame, k + 1);
+  }
+}
+
+/// A loop on the rig's terms whose only command comes in just before the sleep that ends at `at`.
+struct Timed {
+  LoopReport report;
+  std::vector<CommandRecord> commands;
+  std::vector<engine::Shot> shots;
+};
+Timed run_with_command_before(SimTime at) {
+  fakes::QueueSource source;
+  fakes::HookedClock clock(kStart - kPeriod, [&](SimTime until) {
+    if (until != at) return;
+    Command command;
+    command.kind = CommandKind::kTrim;
+    command.trim_offset_rad = {1.0, 0.0};
+    source.give(command);
+    source.wait_until_taken();
+  });
+  IdealPointing pointing;
+  fakes::PixelGenerator generator;
+  fakes::Sink sink;
+  FrameLoop loop(patient_loop(10), clock, pointing, generator, sink, source);
+  Timed out;
+  out.report = loop.run({});
+  out.commands = drain(loop.commands());
+  out.shots = generator.shots();
+  EXPECT_EQ(pointing.steps_back(), 0);
+  return out;
+}
+
+TEST(FrameLoop, ACommandThatIsInBeforeTheSlotShowsInThatFrame) {
+  const Timed run = run_with_command_before(opening(4) - LoopSpec{}.command_lead);
+  ASSERT_EQ(run.commands.size(), 1U);
+  EXPECT_EQ(run.commands[0].frame, 4U);
+  for (const engine::Shot& shot : run.shots)
+    EXPECT_EQ(shot.attitude.open.axes.matrix(0, 0), shot.sequence >= 4 ? 1.0 : 0.0);
+}
+
+TEST(FrameLoop, ACommandAfterTheSlotWaitsForTheNext) {
+  const Timed run = run_with_command_before(opening(4));
+  ASSERT_EQ(run.commands.size(), 1U);
+  EXPECT_EQ(run.commands[0].frame, 5U);
+  for (const engine::Shot& shot : run.shots)
+    EXPECT_EQ(shot.attitude.open.axes.matrix(0, 0), shot.sequence >= 5 ? 1.0 : 0.0);
+}
+
+TEST(FrameLoop, CommandsOfOneSlotAreObeyedInTheOrderTheyCame) {
+  fakes::QueueSource source;
+  fakes::HookedClock clock(kStart - kPeriod, [&](SimTime until) {
+    if (until != opening(3)) return;
+    for (std::uint64_t i = 0; i < 20; ++i) {
+      Command command;
+      command.answers_frame = i;
+      source.give(command);
+    }
+    source.wait_until_taken();
+  });
+  IdealPointing pointing;
+  fakes::PixelGenerator generator;
+  fakes::Sink sink;
+  FrameLoop loop(patient_loop(6), clock, pointing, generator, sink, source);
+  EXPECT_EQ(loop.run({}).commands, 20U);
+  const auto records = drain(loop.commands());
+  ASSERT_EQ(records.size(), 20U);
+  for (std::uint64_t i = 0; i < 20; ++i) {
+    EXPECT_EQ(records[i].command.answers_frame, i);
+    EXPECT_EQ(records[i].frame, 4U);
+  }
+}
+
+TEST(FrameLoop, AFloodOfCommandsIsObeyedOrCountedAsLost) {
+  constexpr std::uint64_t kFlood = 1000;
+  fakes::QueueSource source;
+  fakes::HookedClock clock(kStart - kPeriod, [&](SimTime until) {
+    if (until != opening(3)) return;
+    for (std::uint64_t i = 0; i < kFlood; ++i) source.give(Command{});
+    source.wait_until_taken();
+  });
+  IdealPointing pointing;
+  fakes::PixelGenerator generator;
+  fakes::Sink sink;
+  FrameLoop loop(patient_loop(6), clock, pointing, generator, sink, source);
+  const LoopReport report = loop.run({});
+  EXPECT_EQ(report.sent, 6U);
+  EXPECT_EQ(report.commands, 256U);  // the ring between receiver and loop
+  EXPECT_EQ(report.commands + report.commands_lost, kFlood);
+  expect_adds_up(report);
+}
+
+TEST(FrameLoop, PacketsThatAreNoCommandsAreCountedAndTheNextIsObeyed) {
+  fakes::QueueSource source;
+  fakes::HookedClock clock(kStart - kPeriod, [&](SimTime until) {
+    if (until != opening(2)) return;
+    for (int i = 0; i < 7; ++i) source.give(Error{Fault::kRejected, 0, "test"});
+    source.give(Error{Fault::kTimeout, 0, "test"});       // nothing came: no fault
+    source.give(Error{Fault::kDisconnected, 0, "test"});  // nobody there: no packet
+    source.give(Command{});
+    source.wait_until_taken();
+  });
+  IdealPointing pointing;
+  fakes::PixelGenerator generator;
+  fakes::Sink sink;
+  FrameLoop loop(patient_loop(5), clock, pointing, generator, sink, source);
+  const LoopReport report = loop.run({});
+  EXPECT_EQ(report.command_faults, 7U);
+  EXPECT_EQ(report.commands, 1U);
+}
+
+TEST(FrameLoop, InLockstepOtherCommandsDoNotCountAsTheAnswerAndNoneIsLost) {
+  hil::ManualClock clock(kStart - kPeriod);
+  IdealPointing pointing;
+  fakes::PixelGenerator generator;
+  fakes::QueueSource answers;
+  fakes::Sink sink([&answers](const Frame& frame, Duration) -> Status {
+    Command stale = trim_answer(frame, -7.0);
+    stale.answers_frame = frame.sequence - 1;  // of the frame before; of none at first
+    stale.kind = CommandKind::kReport;
+    answers.give(stale);
+    answers.give(trim_answer(frame, static_cast<double>(frame.sequence) + 1.0));
+    return engine::Done{};
+  });
+  FrameLoop loop(lockstep_loop(20), clock, pointing, generator, sink, answers);
+  const LoopReport report = loop.run({});
+  EXPECT_EQ(report.sent, 20U);
+  EXPECT_EQ(report.commands, 40U);
+  EXPECT_FALSE(report.answer_missing);
+  for (const engine::Shot& shot : generator.shots())
+    EXPECT_EQ(shot.attitude.open.axes.matrix(0, 0), static_cast<double>(shot.sequence));
+}
+
+// ---- ends -----------------------------------------------------------------------------------
+
+TEST(FrameLoop, LockstepEndsWhenAnAnswerDoesNotCome) {
+  hil::ManualClock clock(kStart - kPeriod);
+  IdealPointing pointing;
+  fakes::PixelGenerator generator;
+  fakes::Device device([](const Frame& frame) -> std::optional<Command> {
+    if (frame.sequence == 3) return std::nullopt;
+    return trim_answer(frame);
+  });
+  LoopSpec spec = lockstep_loop(100);
+  // Long enough for a busy machine to pass the first three answers on.
+  spec.answer_timeout = std::chrono::milliseconds(300);
+  FrameLoop loop(spec, clock, pointing, generator, device, device);
+  const LoopReport report = loop.run({});
+  EXPECT_TRUE(report.answer_missing);
+  EXPECT_EQ(report.due, 4U);
+  EXPECT_EQ(report.sent, 4U);
+  EXPECT_EQ(report.commands, 3U);
+  expect_adds_up(report);
+  EXPECT_EQ(drain(loop.frames()).size(), 4U);
+}
+
+TEST(FrameLoop, LockstepEndsWhenTheLinkIsGone) {
+  hil::ManualClock clock(kStart - kPeriod);
+  IdealPointing pointing;
+  fakes::PixelGenerator generator;
+  fakes::Sink sink([](const Frame&, Duration) -> Status {
+    return Error{Fault::kDisconnected, 19, "gone"};
+  });
+  fakes::SilentSource source;
+  LoopSpec spec = lockstep_loop(100);
+  spec.answer_timeout = kMillisecond;
+  FrameLoop loop(spec, clock, pointing, generator, sink, source);
+  const LoopReport report = loop.run({});
+  EXPECT_TRUE(report.answer_missing);
+  EXPECT_EQ(report.faults, 1U);
+  expect_adds_up(report);
+}
+
+TEST(FrameLoop, LockstepAnswersThatNeverFitDoNotKeepItWaitingForEver) {
+  hil::ManualClock clock(kStart - kPeriod);
+  IdealPointing pointing;
+  fakes::PixelGenerator generator;
+  fakes::SilentSource nobody;
+  // A device that talks all the time, but of another frame: one command after the other, as fast
+  // as the loop takes them, and each sooner than the timeout.
+  class Chatter final : public hil::CommandSource {
+   public:
+    engine::Expected<Command> receive(Duration timeout) noexcept override {
+      static_cast<void>(pause_.try_acquire_for(std::min(timeout, kMillisecond)));
+      Command command;
+      command.answers_frame = 999;
+      // Enough for ten timeouts; then it gives up, so that this test ends either way.
+      if (++said_ > 1000) return Error{Fault::kTimeout, 0, "chatter"};
+      return command;
+    }
+    [[nodiscard]] int said() const noexcept { return said_; }
+
+   private:
+    std::counting_semaphore<> pause_{0};
+    int said_ = 0;
+  } chatter;
+  fakes::Sink sink;
+  LoopSpec spec = lockstep_loop(3);
+  spec.answer_timeout = kMillisecond * 100;
+  FrameLoop loop(spec, clock, pointing, generator, sink, chatter);
+  const LoopReport report = loop.run({});
+  EXPECT_TRUE(report.answer_missing);
+  EXPECT_LT(chatter.said(), 1000) << "the wait began anew with every command";
+  expect_adds_up(report);
+}
+
+TEST(FrameLoop, AStopEndsItAfterTheFrameInHand) {
+  std::stop_source stop;
+  hil::ManualClock clock(kStart - kPeriod);
+  IdealPointing pointing;
+  fakes::PixelGenerator generator([&stop](const engine::Shot& shot) {
+    if (shot.sequence == 5) stop.request_stop();
+  });
+  fakes::Sink sink;
+  fakes::SilentSource source;
+  FrameLoop loop(patient_loop(1'000'000), clock, pointing, generator, sink, source);
+  const LoopReport report = loop.run(stop.get_token());
+  EXPECT_EQ(report.due, 6U);
+  EXPECT_EQ(report.sent, 6U);
+  expect_adds_up(report);
+}
+
+TEST(FrameLoop, AStopBeforeTheFirstFrameSendsNone) {
+  std::stop_source stop;
+  stop.request_stop();
+  hil::ManualClock clock(kStart - kPeriod);
+  IdealPointing pointing;
+  fakes::PixelGenerator generator;
+  fakes::Sink sink;
+  fakes::SilentSource source;
+  FrameLoop loop(patient_loop(10), clock, pointing, generator, sink, source);
+  const LoopReport report = loop.run(stop.get_token());
+  EXPECT_EQ(report.due, 0U);
+  EXPECT_TRUE(sink.sequences().empty());
+}
+
+TEST(FrameLoop, AStopReachesALoopThatWaitsForASlot) {
+  std::stop_source stop;
+  hil::ManualClock clock(kStart - kPeriod);
+  IdealPointing pointing;
+  fakes::PixelGenerator generator;
+  // Holds every frame until the stop, and then as long as it was allowed to: not at all.
+  fakes::Sink sink([&stop](const Frame& frame, Duration) -> Status {
+    if (frame.sequence == 0) {
+      while (!stop.stop_requested()) std::this_thread::yield();
+    }
+    return Error{Fault::kBusy, 0, "held"};
+  });
+  fakes::SilentSource source;
+  FrameLoop loop(patient_loop(1'000'000), clock, pointing, generator, sink, source);
+  LoopReport report;
+  std::jthread runner([&] { report = loop.run(stop.get_token()); });
+  std::uint64_t seen = 0;
+  while (seen < 4) {
+    if (FrameRecord r; loop.frames().pop(r)) {
+      ++seen;
+    } else {
+      std::this_thread::yield();
+    }
+  }
+  stop.request_stop();
+  runner.join();
+  EXPECT_GE(report.due, 4U);
+  EXPECT_LE(report.due, 6U);
+  expect_adds_up(report);
+}
+
+TEST(FrameLoop, AStopReachesALoopThatWaitsForAnAnswer) {
+  std::stop_source stop;
+  hil::ManualClock clock(kStart - kPeriod);
+  IdealPointing pointing;
+  fakes::PixelGenerator generator;
+  fakes::Device device([&stop](const Frame& frame) -> std::optional<Command> {
+    if (frame.sequence < 3) return trim_answer(frame);
+    stop.request_stop();
+    return std::nullopt;
+  });
+  LoopSpec spec = lockstep_loop(100);
+  spec.answer_timeout = std::chrono::seconds(3);
+  FrameLoop loop(spec, clock, pointing, generator, device, device);
+  const LoopReport report = loop.run(stop.get_token());
+  EXPECT_EQ(report.due, 4U);
+  EXPECT_FALSE(report.answer_missing) << "it waited out the whole timeout, deaf to the stop";
+  expect_adds_up(report);
+}
+
+TEST(FrameLoop, TheLastFramesAnswerIsInTheRecord) {
+  hil::ManualClock clock(kStart - kPeriod);
+  IdealPointing pointing;
+  fakes::PixelGenerator generator;
+  fakes::Device device([](const Frame& frame) { return trim_answer(frame); });
+  FrameLoop loop(lockstep_loop(1), clock, pointing, generator, device, device);
+  const LoopReport report = loop.run({});
+  EXPECT_EQ(report.commands, 1U);
+  const auto records = drain(loop.commands());
+  ASSERT_EQ(records.size(), 1U);
+  EXPECT_EQ(records[0].command.answers_frame, 0U);
+  EXPECT_EQ(records[0].frame, 1U);
+}
+
+TEST(FrameLoopDeathTest, RefusesAnExposureThatDoesNotFitIntoAPeriod) {
+  testing::FLAGS_gtest_death_test_style = "threadsafe";
+  LoopSpec spec = small_loop(1);
+  spec.exposure = spec.period - spec.command_lead + Duration(1);
+  hil::ManualClock clock(kStart);
+  IdealPointing pointing;
+  fakes::PixelGenerator generator;
+  fakes::Sink sink;
+  fakes::SilentSource source;
+  EXPECT_DEATH(FrameLoop(spec, clock, pointing, generator, sink, source), "our own mistake");
+}
+
+}  // namespace

@@ -1,0 +1,164 @@
+// The loop with everything real in it but the cable and the software under test: once the first
+// shutter has opened, nobody takes anything from the heap.
+
+#include <cstdlib>
+#include <memory>
+#include <thread>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "drivers/mock_link.h"
+#include "tests/support/no_alloc.h"
+#include "tools/starloop/scenario.h"
+
+namespace {
+
+using engine::Duration;
+
+/// The paper's pass through a camera of 128 x 128 coarse pixels, the whole telescope in view.
+starloop::Scenario small_scenario() {
+  starloop::CommonOptions options;
+  options.file = STARLOOP_SOURCE_DIR "/config/flyby.toml";
+  options.overrides = {"camera.width_px=128",        "camera.height_px=128",
+                       "camera.pixel_pitch_um=13",   "optics.aperture_m=0.18",
+                       "render.samples_per_pixel=4", "optics.largest_wing_px=16",
+                       "guidance.error_x_urad=5",    "guidance.error_growth_x_urad_s=1"};
+  return starloop::load_scenario(options);
+}
+
+struct Outcome {
+  hil::LoopReport report;
+  std::uint64_t allocations = 0;
+  std::uint64_t frames_with_target = 0;
+  std::uint64_t records = 0;
+};
+
+class Bench {
+ public:
+  Bench() : scenario_(small_scenario()), rig_(scenario_, 2) {
+    pass_ = starloop::passes_of(scenario_)[scenario_.run.pass - 1];
+  }
+
+  /// Lockstep, 250 frames a second: 500 of them are the two seconds about the nearest point.
+  Outcome run(std::uint64_t frames) {
+    hil::LoopSpec spec;
+    spec.start = pass_.closest - Duration(1'000'000'000);
+    spec.period = Duration(4'000'000);
+    spec.exposure = Duration(1'000'000);
+    spec.command_lead = Duration(1'000'000);
+    spec.frames = frames;
+    spec.when_busy = hil::WhenBusy::kWait;
+    spec.answer_timeout = std::chrono::seconds(20);
+    spec.send_timeout = std::chrono::seconds(20);
+    spec.width_px = scenario_.scene.camera.width_px;
+    spec.height_px = scenario_.scene.camera.height_px;
+    spec.bits = scenario_.detector.bits;
+    drivers::MockLink link(spec.width_px, spec.height_px);
+    hil::GuidanceError guidance = scenario_.guidance;
+    guidance.start = spec.start;
+    hil::ClosedLoopPointing pointing(rig_.prediction(), guidance, scenario_.actuator);
+    hil::ManualClock clock(spec.start - spec.period);
+    auto loop = std::make_unique<hil::FrameLoop>(spec, clock, pointing, rig_.chain(), link, link);
+
+    Outcome out;
+    std::jthread device([&link](const std::stop_token& stop) { answer_frames(link, stop); });
+    std::jthread observer([&](const std::stop_token& stop) {
+      // The last look comes after the stop.
+      for (bool last = false;; last = stop.stop_requested()) {
+        for (hil::FrameRecord r; loop->frames().pop(r); ++out.records)
+          if (r.report.truth.peak_e > 100.0) ++out.frames_with_target;
+        for (hil::CommandRecord c; loop->commands().pop(c);) {
+        }
+        if (last) return;
+        std::this_thread::yield();
+      }
+    });
+    const std::uint64_t before = no_alloc::count();
+    out.report = loop->run({});
+    out.allocations = no_alloc::count() - before;
+    return out;
+  }
+
+ private:
+  /// Software under test that only replies: what its own work allocates is not the loop's business.
+  static void answer_frames(drivers::MockLink& link, const std::stop_token& stop) {
+    while (!stop.stop_requested()) {
+      const auto bytes = link.next_frame(Duration(20'000'000));
+      if (!bytes.ok()) continue;
+      const auto view = drivers::decode_frame(bytes.value());
+      ENSURE(view.ok());
+      hil::Command command;
+      command.kind = hil::CommandKind::kTrim;
+      command.answers_frame = view.value().frame.sequence;
+      command.trim_offset_rad = {-5e-6, 0.0};
+      command.reference = view.value().frame.shutter_open;
+      std::array<std::byte, drivers::kCommandBytes> packet{};
+      drivers::encode_command(command, packet);
+      link.release_frame();
+      ENSURE(link.reply(packet).ok());
+    }
+  }
+
+  starloop::Scenario scenario_;
+  starloop::Rig rig_;
+  engine::Pass pass_;
+};
+
+TEST(LoopAllocation, TheCounterCountsEveryWayToTheHeap) {
+  if (!no_alloc::armed()) GTEST_SKIP() << "a sanitizer counts instead";
+  const auto counted = [](auto&& allocate) {
+    const std::uint64_t before = no_alloc::count();
+    allocate();
+    return no_alloc::count() - before;
+  };
+  // volatile: the compiler may leave out an allocation that nobody looks at.
+  EXPECT_EQ(counted([] {}), 0U);
+  EXPECT_EQ(counted([] {
+              char* volatile block = new char[100];
+              delete[] block;
+            }),
+            1U);
+  EXPECT_EQ(counted([] {
+              void* volatile block = std::malloc(100);
+              block = std::realloc(block, 200);
+              std::free(block);
+            }),
+            2U);
+  EXPECT_EQ(counted([] {
+              void* volatile block = std::aligned_alloc(64, 128);
+              std::free(block);
+            }),
+            1U);
+  // And on other threads.
+  std::uint64_t before = 0;
+  std::uint64_t after = 0;
+  std::jthread([&] {
+    before = no_alloc::count();
+    std::vector<int> v(1000);
+    *const_cast<volatile int*>(v.data()) = 1;
+    after = no_alloc::count();
+  }).join();
+  EXPECT_EQ(after - before, 1U);
+}
+
+TEST(LoopAllocation, FiveHundredFramesTakeNoMoreFromTheHeapThanTen) {
+  if (!no_alloc::armed()) GTEST_SKIP() << "a sanitizer counts instead";
+  Bench bench;
+  const Outcome warm_up = bench.run(10);
+  ASSERT_EQ(warm_up.report.sent, 10U);
+  const Outcome few = bench.run(10);
+  const Outcome many = bench.run(500);
+  for (const auto& [outcome, frames] : {std::pair(&few, 10U), {&many, 500U}}) {
+    // A loop that drops its frames, or shows an empty sky, would prove nothing.
+    EXPECT_EQ(outcome->report.due, frames);
+    EXPECT_EQ(outcome->report.sent, frames);
+    EXPECT_EQ(outcome->report.commands, frames);
+    EXPECT_EQ(outcome->records, frames);
+    EXPECT_EQ(outcome->frames_with_target, frames);
+    EXPECT_FALSE(outcome->report.answer_missing);
+  }
+  EXPECT_EQ(few.allocations, many.allocations);
+}
+
+}  // namespace

@@ -1,0 +1,315 @@
+#include "tools/starloop/scenario.h"
+
+#include <fstream>
+#include <optional>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+namespace {
+
+using engine::ConfigError;
+using engine::ConfigReader;
+using starloop::CommonOptions;
+using starloop::Scenario;
+
+const std::string kFlyby = STARLOOP_SOURCE_DIR "/config/flyby.toml";
+
+std::string flyby_text() {
+  std::ostringstream text;
+  text << std::ifstream(kFlyby).rdbuf();
+  return text.str();
+}
+
+Scenario load(const std::vector<std::string>& overrides = {}) {
+  CommonOptions options;
+  options.file = kFlyby;
+  options.overrides = overrides;
+  return starloop::load_scenario(options);
+}
+
+/// What the ConfigError says; nothing when there is none.
+template <class Work>
+std::optional<std::string> complaint(const Work& work) {
+  try {
+    work();
+  } catch (const ConfigError& e) {
+    return e.what();
+  }
+  return std::nullopt;
+}
+
+bool starts_with(const std::string& text, const std::string& start) {
+  return text.rfind(start, 0) == 0;
+}
+
+/// The line, from 1, that starts with `start` in the table `table`.
+int line_of(const std::string& text, const std::string& table, const std::string& start) {
+  std::istringstream in(text);
+  bool inside = false;
+  int number = 0;
+  for (std::string line; std::getline(in, line);) {
+    ++number;
+    if (starts_with(line, "[")) inside = starts_with(line, "[" + table + "]");
+    if (inside && starts_with(line, start)) return number;
+  }
+  return 0;
+}
+
+/// The text with one line of a table replaced.
+std::string with_line(const std::string& text, int number, const std::string& replacement) {
+  std::istringstream in(text);
+  std::string out;
+  int at = 0;
+  for (std::string line; std::getline(in, line);)
+    out.append(++at == number ? replacement : line).append("\n");
+  return out;
+}
+
+TEST(Scenario, ThePapersPassLoads) {
+  const Scenario s = load();
+  EXPECT_EQ(s.name, "flyby");
+  EXPECT_EQ(s.run.pass, 3U);
+  EXPECT_EQ(s.run.exposure, engine::Duration(1'000'000));
+  EXPECT_EQ(s.run.period, engine::Duration(100'000'000));
+  EXPECT_EQ(s.run.command_lead, engine::Duration(20'000'000));
+  EXPECT_DOUBLE_EQ(s.camera_orbit.semi_major_axis_m, 6868.8546e3);
+  EXPECT_DOUBLE_EQ(s.scene.camera.pixel_pitch_m, 6.5e-6);
+  EXPECT_EQ(s.scene.camera.width_px, 1024);
+  EXPECT_EQ(s.detector.bits, 11);
+  EXPECT_DOUBLE_EQ(s.guidance.offset_rad[0], 200e-6);
+  EXPECT_DOUBLE_EQ(s.guidance.growth_rad_s[0], 50e-6);
+  EXPECT_DOUBLE_EQ(s.actuator.rate_limit_rad_s, 2e-3);
+  EXPECT_DOUBLE_EQ(s.actuator.acceleration_limit_rad_s2, 10e-3);
+  EXPECT_DOUBLE_EQ(s.criteria.pointing_rms_px, 0.5);
+}
+
+TEST(Scenario, OverridesAndTheSeedReplaceWhatTheFileSays) {
+  const Scenario s = load({"detector.read_noise_e=4", "run.clock=lockstep", "scenario.name=other"});
+  EXPECT_EQ(s.run.clock, starloop::ClockMode::kLockstep);
+  EXPECT_EQ(s.name, "other");
+  CommonOptions options;
+  options.file = kFlyby;
+  options.seed_given = true;
+  options.seed = 99;
+  EXPECT_EQ(starloop::load_scenario(options).scene.seed, 99U);
+}
+
+// Li et al. 2023's orbits: 16 windows nearer than 300 km in 15 days (two-body, both epochs t = 0).
+TEST(Scenario, ThePapersOrbitsHaveSixteenPasses) {
+  const std::vector<engine::Pass> passes = starloop::passes_of(load());
+  EXPECT_EQ(passes.size(), 16U);
+  for (const engine::Pass& p : passes) {
+    EXPECT_LT(p.start, p.end);
+    EXPECT_LE(p.start, p.closest);
+    EXPECT_LE(p.closest, p.end);
+    EXPECT_LT(p.min_range_m, 300e3);
+  }
+}
+
+struct BadValue {
+  std::string assignment;
+  std::string key;  ///< the complaint is about this one
+  std::string says;
+};
+
+// Unknown keys, wrong types, out of range, not one of the words: each says where and what.
+const std::vector<BadValue> kBadValues = {
+    {"detector.full_well_e=-30000", "detector.full_well_e", "must be > 0, got -30000"},
+    {"detector.quantum_efficiency=1.5", "detector.quantum_efficiency", "got 1.5"},
+    {"detector.bits=0", "detector.bits", "got 0"},
+    {"detector.bits=17", "detector.bits", "got 17"},
+    {"detector.read_noise_e=\"two\"", "detector.read_noise_e", "got \"two\""},
+    {"detector.colour=1", "detector.colour", "is not a key"},
+    {"gearbox.teeth=12", "gearbox.teeth", "is not a key"},
+    {"orbit.moon.raan_deg=0", "orbit.moon.raan_deg", "is not a key"},
+    {"run.pass=0", "run.pass", "must be >= 1, got 0"},
+    {"run.pass=2.5", "run.pass", "must be a whole number, got 2.5"},
+    {"run.pass=third", "run.pass", "got \"third\""},
+    {"run.pass=[3]", "run.pass", "got a value of type array"},
+    {"run.pass=true", "run.pass", "got true"},
+    {"run.frame_rate_hz=0", "run.frame_rate_hz", "got 0"},
+    {"run.exposure_ms=nan", "run.exposure_ms", "got nan"},
+    {"run.duration_s=-1", "run.duration_s", "got -1"},
+    {"run.record_every=0", "run.record_every", "got 0"},
+    {"run.clock=sundial", "run.clock",
+     "must be one of \"realtime\", \"lockstep\", got \"sundial\""},
+    {"run.exposure_ms=80.001", "run.exposure_ms", "must fit into one period"},
+    {"scenario.epoch=yesterday", "scenario.epoch", "must be a UTC date"},
+    {"scenario.epoch=2022-13-01T00:00:00", "scenario.epoch", "must be a UTC date"},
+    {"scenario.name=a/b", "scenario.name", "usable as a folder's name"},
+    {"scenario.name=..", "scenario.name", "usable as a folder's name"},
+    {"scenario.name=7", "scenario.name", "must be text"},
+    {"scenario.seed=-1", "scenario.seed", "got -1"},
+    {"scenario.light_path=curved", "scenario.light_path", "must be one of"},
+    {"orbit.camera.eccentricity=1.0", "orbit.camera.eccentricity", "must be >= 0 and < 1, got 1"},
+    {"orbit.target.inclination_deg=181", "orbit.target.inclination_deg", "got 181"},
+    {"camera.width_px=8", "camera.width_px", "got 8"},
+    {"camera.height_px=4097", "camera.height_px", "got 4097"},
+    {"camera.focal_length_m=inf", "camera.focal_length_m", "got inf"},
+    {"camera.pixel_pitch_um=0", "camera.pixel_pitch_um", "got 0"},
+    {"optics.transmission=1.01", "optics.transmission", "got 1.01"},
+    {"optics.obscuration=1", "optics.obscuration", "got 1"},
+    {"sun.position=guess", "sun.position", "got \"guess\""},
+    {"earth.earthshine=bright", "earth.earthshine", "got \"bright\""},
+    {"sky.radiance_w_m2_sr=-1e-9", "sky.radiance_w_m2_sr", "must be >= 0"},
+    {"render.samples_per_pixel=0", "render.samples_per_pixel", "got 0"},
+    {"brdf.variant=shiny", "brdf.variant", "got \"shiny\""},
+    {"actuator.damping=0", "actuator.damping", "got 0"},
+    {"actuator.rate_limit_mrad_s=0", "actuator.rate_limit_mrad_s", "must be > 0, got 0"},
+    {"tracker.alpha=1.5", "tracker.alpha", "got 1.5"},
+    {"visibility.max_range_km=0", "visibility.max_range_km", "got 0"},
+    {"visibility.span_days=1e9", "visibility.span_days", "got 1000000000"},
+};
+
+TEST(Scenario, ABadOverrideIsAConfigErrorThatQuotesItAndNamesTheKey) {
+  for (const BadValue& bad : kBadValues) {
+    SCOPED_TRACE(bad.assignment);
+    const auto said = complaint([&] { static_cast<void>(load({bad.assignment})); });
+    ASSERT_TRUE(said.has_value());
+    EXPECT_TRUE(starts_with(*said, "--set " + bad.assignment + ": " + bad.key + " ")) << *said;
+    EXPECT_NE(said->find(bad.says), std::string::npos) << *said;
+  }
+}
+
+TEST(Scenario, ABadValueInTheFileIsAConfigErrorThatNamesItsLineAndTheKey) {
+  const std::string text = flyby_text();
+  int checked = 0;
+  for (const BadValue& bad : kBadValues) {
+    const auto equals = bad.assignment.find('=');
+    const auto dot = bad.assignment.rfind('.', equals);
+    const std::string table = bad.assignment.substr(0, dot);
+    std::string key = bad.assignment.substr(dot + 1, equals - dot - 1);
+    const int line = line_of(text, table, key + " =");
+    if (line == 0) continue;  // not in the file
+    std::string value = bad.assignment.substr(equals + 1);
+    // What is no TOML value is a bare word, as for --set.
+    const bool bare = complaint([&] {
+                        static_cast<void>(ConfigReader::from_text("v = " + value, "probe"));
+                      }).has_value();
+    if (bare) value = '"' + value + '"';
+    SCOPED_TRACE(bad.assignment);
+    key.append(" = ").append(value);
+    const std::string broken = with_line(text, line, key);
+    const auto said = complaint([&] {
+      static_cast<void>(starloop::read_scenario(ConfigReader::from_text(broken, "x.toml")));
+    });
+    ASSERT_TRUE(said.has_value());
+    EXPECT_TRUE(starts_with(*said, "x.toml:" + std::to_string(line) + ": " + bad.key + " "))
+        << *said;
+    EXPECT_NE(said->find(bad.says), std::string::npos) << *said;
+    ++checked;
+  }
+  EXPECT_GE(checked, 30);
+}
+
+TEST(Scenario, AMissingKeyIsAConfigErrorThatNamesTheFileAndTheKey) {
+  const std::string text = flyby_text();
+  for (const auto& [table, key] :
+       std::vector<std::pair<std::string, std::string>>{{"scenario", "name"},
+                                                        {"scenario", "epoch"},
+                                                        {"run", "pass"},
+                                                        {"run", "exposure_ms"},
+                                                        {"run", "frame_rate_hz"},
+                                                        {"orbit.camera", "semi_major_axis_km"},
+                                                        {"orbit.camera", "eccentricity"},
+                                                        {"orbit.target", "mean_anomaly_deg"},
+                                                        {"camera", "focal_length_m"},
+                                                        {"camera", "width_px"},
+                                                        {"optics", "aperture_m"},
+                                                        {"detector", "quantum_efficiency"},
+                                                        {"detector", "full_well_e"},
+                                                        {"actuator", "natural_frequency_hz"},
+                                                        {"actuator", "damping"}}) {
+    SCOPED_TRACE(table + "." + key);
+    const int line = line_of(text, table, key + " =");
+    ASSERT_GT(line, 0);
+    const auto said = complaint([&] {
+      static_cast<void>(
+          starloop::read_scenario(ConfigReader::from_text(with_line(text, line, ""), "x.toml")));
+    });
+    ASSERT_TRUE(said.has_value());
+    EXPECT_TRUE(starts_with(*said, "x.toml")) << *said;
+    EXPECT_NE(said->find(table + "." + key + " is missing"), std::string::npos) << *said;
+  }
+}
+
+TEST(Scenario, AnUnknownKeyInTheFileIsNamedWithItsLine) {
+  const std::string text = flyby_text();
+  for (const std::string table : {"scenario", "orbit.camera", "detector", "materials.silicon"}) {
+    SCOPED_TRACE(table);
+    const int header = line_of(text, table, "[");
+    ASSERT_GT(header, 0);
+    const std::string broken = with_line(text, header, "[" + table + "]\nmisspelt = 1");
+    const auto said = complaint([&] {
+      static_cast<void>(starloop::read_scenario(ConfigReader::from_text(broken, "x.toml")));
+    });
+    ASSERT_TRUE(said.has_value());
+    EXPECT_TRUE(
+        starts_with(*said, "x.toml:" + std::to_string(header + 1) + ": " + table + ".misspelt "))
+        << *said;
+  }
+}
+
+TEST(Scenario, APerigeeInsideTheEarthIsAConfigErrorAtTheOrbit) {
+  const auto said = complaint([] { static_cast<void>(load({"orbit.camera.eccentricity=0.2"})); });
+  ASSERT_TRUE(said.has_value());
+  const int line = line_of(flyby_text(), "orbit.camera", "semi_major_axis_km");
+  EXPECT_TRUE(starts_with(
+      *said, kFlyby + ":" + std::to_string(line) + ": orbit.camera.semi_major_axis_km "))
+      << *said;
+  EXPECT_NE(said->find("perigee inside the Earth"), std::string::npos) << *said;
+  EXPECT_NE(said->find("eccentricity"), std::string::npos) << *said;
+}
+
+TEST(Scenario, WhatIsNoAssignmentIsQuotedBack) {
+  for (const std::string text : {"nonsense", "run", "pass=3", "=3", "run.=3", ".pass=3", ""}) {
+    const auto said = complaint([&] { static_cast<void>(load({text})); });
+    ASSERT_TRUE(said.has_value()) << text;
+    EXPECT_EQ(*said, "--set " + text + ": expected table.key=value");
+  }
+  const auto table = complaint([] { static_cast<void>(load({"orbit.camera=3"})); });
+  ASSERT_TRUE(table.has_value());
+  EXPECT_NE(table->find("orbit.camera is a table, not a value"), std::string::npos) << *table;
+  const auto value = complaint([] { static_cast<void>(load({"run.pass.number=3"})); });
+  ASSERT_TRUE(value.has_value());
+  EXPECT_NE(value->find("pass is a value, not a table"), std::string::npos) << *value;
+}
+
+TEST(Scenario, BrokenTomlIsAConfigErrorWithItsLine) {
+  const std::string text = flyby_text();
+  const int line = line_of(text, "run", "pass =");
+  for (const std::string broken : {"pass = ", "pass 3", "pass = \"3", "[run", "pass = 3 4"}) {
+    const auto said = complaint([&] {
+      static_cast<void>(ConfigReader::from_text(with_line(text, line, broken), "x.toml"));
+    });
+    ASSERT_TRUE(said.has_value()) << broken;
+    // Some are only seen at the start of the line after.
+    EXPECT_TRUE(starts_with(*said, "x.toml:" + std::to_string(line) + ": ") ||
+                starts_with(*said, "x.toml:" + std::to_string(line + 1) + ": "))
+        << *said;
+  }
+  EXPECT_TRUE(complaint([] {
+                static_cast<void>(ConfigReader::from_text("a.b = 1\na.b = 2\n", "x.toml"));
+              }).has_value());
+}
+
+TEST(Scenario, ATableWrittenAsAValueIsAConfigError) {
+  const auto said = complaint([] {
+    static_cast<void>(starloop::read_scenario(ConfigReader::from_text("scenario = 5\n", "x.toml")));
+  });
+  ASSERT_TRUE(said.has_value());
+  EXPECT_EQ(*said, "x.toml:1: scenario must be a table, got 5");
+}
+
+TEST(Scenario, AFileThatIsNotThereIsAConfigErrorWithItsName) {
+  CommonOptions options;
+  options.file = "/nowhere/at_all.toml";
+  const auto said = complaint([&] { static_cast<void>(starloop::load_scenario(options)); });
+  ASSERT_TRUE(said.has_value());
+  EXPECT_TRUE(starts_with(*said, "/nowhere/at_all.toml: ")) << *said;
+}
+
+}  // namespace

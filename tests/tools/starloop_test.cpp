@@ -1,0 +1,257 @@
+// The program as its user meets it: arguments in, files and an exit code out.
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <map>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "tests/tools/program.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+using program::content_of;
+using program::Outcome;
+using program::starloop;
+using program::TemporaryFolder;
+
+const std::string kFlyby = STARLOOP_SOURCE_DIR "/config/flyby.toml";
+constexpr int kGood = 0;
+constexpr int kCriterionFailed = 1;
+constexpr int kBadInput = 2;
+constexpr int kDeviceFault = 3;
+
+/// A lockstep run with few samples, for laws that do not depend on how good the picture is.
+Outcome short_run(const fs::path& out, const std::vector<std::string>& more) {
+  std::vector<std::string> arguments = {"run", kFlyby, "--quiet", "--out", out.string()};
+  for (const std::string set : {"run.clock=lockstep", "render.samples_per_pixel=9"}) {
+    arguments.emplace_back("--set");
+    arguments.push_back(set);
+  }
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  return starloop(arguments);
+}
+
+nlohmann::json report_of(const fs::path& out) {
+  return nlohmann::json::parse(content_of(out / "latest" / "report.json"));
+}
+
+std::vector<std::vector<std::string>> table_of(const fs::path& file) {
+  std::vector<std::vector<std::string>> rows;
+  std::istringstream lines(content_of(file));
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream cells(line);
+    rows.emplace_back();
+    for (std::string cell; std::getline(cells, cell, ',');) rows.back().push_back(cell);
+  }
+  return rows;
+}
+
+TEST(StarloopRun, OpenLoopLosesTheTarget) {
+  const TemporaryFolder folder;
+  const Outcome run = short_run(folder.path(), {"--open-loop", "--set", "run.duration_s=12"});
+  // Without a loop there is no criterion to miss.
+  EXPECT_EQ(run.exit_code, kGood) << run.err;
+  const nlohmann::json report = report_of(folder.path());
+  EXPECT_EQ(report["open_loop"], true);
+  EXPECT_EQ(report["frames"]["due"], 121);
+  EXPECT_EQ(report["frames"]["sent"], 121);
+  // 200 urad + 50 urad/s t is the way from the boresight to the edge of the frame, 512.5 px of
+  // 1.4444 urad, at 10.8 s; 0.3 s are three frames.
+  ASSERT_TRUE(report["pointing"]["lost_after_s"].is_number());
+  EXPECT_NEAR(report["pointing"]["lost_after_s"].get<double>(), 10.8, 0.3);
+  // Reports were heard, and nothing was obeyed.
+  EXPECT_EQ(report["commands"]["taken"], 121);
+  const auto frames = table_of(folder.path() / "latest" / "frames.csv");
+  const auto& header = frames.front();
+  const auto trim = static_cast<std::size_t>(
+      std::find(header.begin(), header.end(), "trim_x_urad") - header.begin());
+  ASSERT_LT(trim, header.size());
+  for (std::size_t i = 1; i < frames.size(); ++i) EXPECT_EQ(std::stod(frames[i][trim]), 0.0);
+}
+
+TEST(StarloopRun, OneThreadAndTwoMakeTheSameRunToTheBit) {
+  std::map<std::string, TemporaryFolder> folders;
+  for (const std::string threads : {"1", "2"}) {
+    const Outcome run = short_run(folders[threads].path(),
+                                  {"--threads", threads, "--set", "run.duration_s=3", "--set",
+                                   "run.record_every=5", "--set", "criteria.pointing_rms_px=0"});
+    ASSERT_EQ(run.exit_code, kGood) << run.err;
+    EXPECT_EQ(report_of(folders[threads].path())["threads"], std::stoi(threads));
+  }
+  const fs::path one = folders["1"].path() / "latest";
+  const fs::path two = folders["2"].path() / "latest";
+  EXPECT_EQ(content_of(one / "commands.csv"), content_of(two / "commands.csv"));
+
+  const auto a = table_of(one / "frames.csv");
+  const auto b = table_of(two / "frames.csv");
+  ASSERT_EQ(a.size(), 32U);  // a header, and 31 frames in 3 s
+  ASSERT_EQ(b.size(), a.size());
+  int measured_times = 0;
+  for (std::size_t column = 0; column < a[0].size(); ++column) {
+    const std::string& name = a[0][column];
+    if (name.size() > 3 && name.substr(name.size() - 3) == "_ms") {
+      ++measured_times;
+      continue;
+    }
+    for (std::size_t row = 0; row < a.size(); ++row)
+      EXPECT_EQ(a[row].at(column), b[row].at(column)) << name << ", frame " << row - 1;
+  }
+  EXPECT_EQ(measured_times, 6);
+
+  // A slow disk costs pictures, which is why not all of them are asked for.
+  int pictures = 0;
+  for (int frame = 0; frame < 31; frame += 5) {
+    char name[32];
+    std::snprintf(name, sizeof name, "frame_%06d.png", frame);
+    if (!fs::exists(one / name) || !fs::exists(two / name)) continue;
+    const std::string picture = content_of(one / name);
+    EXPECT_EQ(picture.substr(1, 3), "PNG");
+    EXPECT_TRUE(picture == content_of(two / name)) << name << " differs";
+    ++pictures;
+  }
+  EXPECT_GE(pictures, 4);
+}
+
+TEST(StarloopRun, ExitCodeAndReportSayWhetherTheCriterionWasMet) {
+  for (const bool met : {true, false}) {
+    const TemporaryFolder folder;
+    const Outcome run = short_run(
+        folder.path(), {"--set", "run.duration_s=0.5", "--set", "criteria.after_s=0", "--set",
+                        std::string("criteria.pointing_rms_px=") + (met ? "1000" : "0.001")});
+    EXPECT_EQ(run.exit_code, met ? kGood : kCriterionFailed) << run.err;
+    const nlohmann::json report = report_of(folder.path());
+    EXPECT_EQ(report["criteria_met"], met);
+    EXPECT_EQ(report["command_latency_frames"], 1);
+    const nlohmann::json& f = report["frames"];
+    EXPECT_EQ(f["due"].get<int>(), 6);
+    EXPECT_EQ(f["due"].get<int>(), f["sent"].get<int>() + f["skipped"].get<int>() +
+                                       f["dropped"].get<int>() + f["faults"].get<int>());
+  }
+}
+
+TEST(StarloopRun, BadInputIsTwoAndSaysWhatIsWrong) {
+  const TemporaryFolder folder;
+  struct Case {
+    std::vector<std::string> arguments;
+    std::string says;
+  };
+  const std::string out = folder.path().string();
+  const std::vector<Case> cases = {
+      {{}, "subcommand"},
+      {{"fly", kFlyby}, "subcommand"},
+      {{"run"}, "scenario"},
+      {{"run", kFlyby, "--quick"}, "--quick"},
+      {{"run", kFlyby, "--threads", "0"}, "--threads"},
+      {{"run", kFlyby, "--threads", "many"}, "--threads"},
+      {{"run", "/nowhere/at_all.toml", "--out", out}, "/nowhere/at_all.toml"},
+      {{"run", kFlyby, "--out", out, "--set", "run.pass=17"}, "run.pass"},
+      {{"run", kFlyby, "--out", out, "--set", "detector.bits=0"}, "detector.bits"},
+      {{"run", kFlyby, "--out", out, "--set", "nonsense"}, "nonsense"},
+      {{"run", kFlyby, "--out", out, "--set", "target.mesh=/nowhere/x.obj"}, "/nowhere/x.obj"},
+      {{"passes", "/nowhere/at_all.toml"}, "/nowhere/at_all.toml"},
+      {{"passes", kFlyby, "--time", "3"}, "--time"},
+      {{"render", kFlyby}, "--time"},
+      {{"render", kFlyby, "--time", "soon"}, "--time"},
+      {{"render", kFlyby, "--time", "-1"}, "--time"},
+      {{"render", "/nowhere/at_all.toml", "--time", "1"}, "/nowhere/at_all.toml"},
+  };
+  for (const Case& c : cases) {
+    std::string line = "starloop";
+    for (const std::string& argument : c.arguments) line += " " + argument;
+    SCOPED_TRACE(line);
+    const Outcome run = starloop(c.arguments);
+    EXPECT_EQ(run.exit_code, kBadInput);
+    EXPECT_NE(run.err.find(c.says), std::string::npos) << run.err;
+  }
+  EXPECT_TRUE(fs::is_empty(folder.path())) << "bad input left something behind";
+}
+
+TEST(StarloopRun, AFolderThatCannotBeMadeIsTheMachinesFault) {
+  const Outcome run = short_run("/proc/starloop", {"--set", "run.duration_s=0.1"});
+  EXPECT_EQ(run.exit_code, kDeviceFault);
+  EXPECT_NE(run.err.find("/proc/starloop"), std::string::npos) << run.err;
+}
+
+TEST(StarloopRun, HelpIsNoMistake) {
+  for (const std::vector<std::string>& arguments :
+       {std::vector<std::string>{"--help"}, {"run", "--help"}, {"passes", "-h"}}) {
+    const Outcome run = starloop(arguments);
+    EXPECT_EQ(run.exit_code, kGood);
+    EXPECT_FALSE(run.out.empty());
+  }
+}
+
+TEST(StarloopPasses, PrintsSixteenObjectsWithTheDocumentedKeys) {
+  const Outcome run = starloop({"passes", kFlyby, "--json"});
+  ASSERT_EQ(run.exit_code, kGood) << run.err;
+  const nlohmann::json passes = nlohmann::json::parse(run.out);
+  ASSERT_TRUE(passes.is_array());
+  ASSERT_EQ(passes.size(), 16U);
+  double last_end_s = 0;
+  for (const nlohmann::json& p : passes) {
+    ASSERT_EQ(p.size(), 7U);
+    for (const char* key : {"start_s", "end_s", "duration_s", "closest_s", "min_range_km"})
+      ASSERT_TRUE(p.at(key).is_number()) << key;
+    for (const char* key : {"start_limited_by", "end_limited_by"})
+      ASSERT_TRUE(p.at(key).is_string()) << key;
+    EXPECT_GT(p["start_s"].get<double>(), last_end_s);
+    EXPECT_GT(p["end_s"].get<double>(), p["start_s"].get<double>());
+    EXPECT_NEAR(p["duration_s"].get<double>(),
+                p["end_s"].get<double>() - p["start_s"].get<double>(), 2e-9);
+    EXPECT_LT(p["min_range_km"].get<double>(), 300.0);
+    last_end_s = p["end_s"].get<double>();
+  }
+}
+
+TEST(StarloopPasses, PrintsALineForEach) {
+  const Outcome quiet = starloop({"passes", kFlyby, "--quiet"});
+  EXPECT_EQ(quiet.exit_code, kGood);
+  EXPECT_EQ(std::count(quiet.out.begin(), quiet.out.end(), '\n'), 17);  // and a header
+}
+
+TEST(StarloopRender, WritesTheSameFitsAndPngOnAnyNumberOfThreads) {
+  const TemporaryFolder folder;
+  std::map<std::string, std::string> fits;
+  std::map<std::string, std::string> png;
+  for (const std::string threads : {"1", "2"}) {
+    const fs::path file = folder.path() / ("frame" + threads + ".fits");
+    const Outcome run =
+        starloop({"render", kFlyby, "--time", "309781.7", "--threads", threads, "--out",
+                  file.string(), "--set", "render.samples_per_pixel=9", "--quiet"});
+    ASSERT_EQ(run.exit_code, kGood) << run.err;
+    EXPECT_EQ(run.out, "");
+    fits[threads] = content_of(file);
+    png[threads] = content_of(fs::path(file).replace_extension(".png"));
+  }
+  EXPECT_EQ(fits["1"].substr(0, 9), "SIMPLE  =");
+  // Blocks of 2880 bytes: a header, and 1024 x 1024 pixels of two bytes.
+  EXPECT_EQ(fits["1"].size() % 2880, 0U);
+  EXPECT_GE(fits["1"].size(), 2880U + 2U * 1024U * 1024U);
+  EXPECT_EQ(png["1"].substr(0, 8), "\x89PNG\r\n\x1a\n");
+  EXPECT_TRUE(fits["1"] == fits["2"]);
+  EXPECT_TRUE(png["1"] == png["2"]);
+}
+
+TEST(StarloopRender, SeedChangesTheNoiseAndNothingMore) {
+  const TemporaryFolder folder;
+  std::vector<std::string> frames;
+  for (const std::string seed : {"1", "2", "1"}) {
+    const fs::path file = folder.path() / "frame.fits";
+    ASSERT_EQ(starloop({"render", kFlyby, "--time", "309781.7", "--seed", seed, "--out",
+                        file.string(), "--set", "render.samples_per_pixel=4", "--quiet"})
+                  .exit_code,
+              kGood);
+    frames.push_back(content_of(file));
+  }
+  EXPECT_TRUE(frames[0] == frames[2]);
+  EXPECT_FALSE(frames[0] == frames[1]);
+}
+
+}  // namespace

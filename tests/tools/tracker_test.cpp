@@ -1,0 +1,271 @@
+#include "tools/tracker/tracker.h"
+
+#include <array>
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+namespace {
+
+using engine::Duration;
+using engine::PixelPoint;
+using engine::SimTime;
+using hil::Command;
+using hil::CommandKind;
+using tracker::Tracker;
+using tracker::TrackerSpec;
+
+constexpr int kSide_px = 128;
+constexpr int kCentre_px = kSide_px / 2;
+constexpr std::uint16_t kWhite_dn = 2047;
+constexpr double kBackground_dn = 20;
+// What the tracker promises on a clean spot.
+constexpr double kCentroid_px = 0.05;
+
+/// A dark sky with one DN of noise.
+engine::DnImage dark_sky(unsigned seed = 1) {
+  engine::DnImage image(kSide_px, kSide_px);
+  std::mt19937 random(seed);
+  std::normal_distribution<double> noise(kBackground_dn, 1.0);
+  for (std::uint16_t& dn : image.pixels())
+    dn = static_cast<std::uint16_t>(std::lround(std::max(0.0, noise(random))));
+  return image;
+}
+
+/// Adds a round spot of 2 px sigma, clipped at full scale.
+void add_spot(engine::DnImage& image, PixelPoint centre, double peak_dn) {
+  constexpr double kSigma_px = 2.0;
+  for (int v = 0; v < image.height(); ++v) {
+    for (int u = 0; u < image.width(); ++u) {
+      const double r2 = std::pow(u - centre.u, 2) + std::pow(v - centre.v, 2);
+      const double dn = image.at(u, v) + peak_dn * std::exp(-0.5 * r2 / (kSigma_px * kSigma_px));
+      image.at(u, v) = static_cast<std::uint16_t>(std::lround(std::min<double>(dn, kWhite_dn)));
+    }
+  }
+}
+
+engine::DnImage spot_at(PixelPoint centre, double peak_dn = 800, unsigned seed = 1) {
+  engine::DnImage image = dark_sky(seed);
+  add_spot(image, centre, peak_dn);
+  return image;
+}
+
+std::vector<std::byte> bytes_of(const engine::DnImage& image, std::uint64_t sequence = 0,
+                                Duration after_start = {}, hil::TrimAngles trim_rad = {}) {
+  hil::Frame frame;
+  frame.sequence = sequence;
+  frame.shutter_open = engine::sim_time(1000.0) + after_start;
+  frame.exposure = Duration(1'000'000);
+  frame.trim_rad = trim_rad;
+  frame.pixels = &image;
+  std::vector<std::byte> bytes(drivers::frame_bytes(image.width(), image.height()));
+  ENSURE(drivers::encode_frame(frame, bytes).ok());
+  return bytes;
+}
+
+/// The tracker's answer, as the camera reads it.
+Command answer(Tracker& tracker, std::span<const std::byte> bytes) {
+  const auto packet = tracker.on_frame(bytes);
+  EXPECT_TRUE(packet.has_value());
+  if (!packet) return {};
+  const auto command = drivers::decode_command(*packet);
+  EXPECT_TRUE(command.ok()) << "its own answer is no command";
+  return command.ok() ? command.value() : Command{};
+}
+
+TEST(Tracker, FindsTheCentreOfASpotToATwentiethOfAPixel) {
+  // The sky's noise of 1 DN over the 22 x 22 px that the spot is measured in moves the centroid of
+  // its 20 000 DN by 0.007 px (1 sigma): 0.05 is seven times that.
+  unsigned seed = 1;
+  for (const PixelPoint centre :
+       {PixelPoint{64, 64}, {64.5, 64.5}, {30.25, 90.8}, {101.37, 20.13}, {20.0, 60.5}}) {
+    Tracker tracker(TrackerSpec{}, kSide_px, kSide_px);
+    const Command command = answer(tracker, bytes_of(spot_at(centre, 800, seed++), 77));
+    EXPECT_EQ(command.answers_frame, 77U);
+    EXPECT_GT(command.detection.confidence, 0.0F);
+    EXPECT_LE(command.detection.confidence, 1.0F);
+    EXPECT_NEAR(command.detection.centroid_px.u, centre.u, kCentroid_px);
+    EXPECT_NEAR(command.detection.centroid_px.v, centre.v, kCentroid_px);
+  }
+}
+
+TEST(Tracker, AnEmptySkyIsReportedAsNoDetectionAndMovesNothing) {
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    Tracker tracker(TrackerSpec{}, kSide_px, kSide_px);
+    const Command command = answer(tracker, bytes_of(dark_sky(seed), 5));
+    EXPECT_EQ(command.kind, CommandKind::kReport);
+    EXPECT_EQ(command.detection.confidence, 0.0F);
+    EXPECT_EQ(command.trim_offset_rad, hil::TrimAngles{});
+    EXPECT_EQ(command.trim_rate_rad_s, hil::TrimAngles{});
+    EXPECT_EQ(command.answers_frame, 5U);
+  }
+}
+
+TEST(Tracker, EvenFramesAreNoDetectionWhateverTheirLevel) {
+  for (const int level : {0, 1, 1000, 2046, 2047, 65535}) {
+    engine::DnImage image(kSide_px, kSide_px);
+    for (std::uint16_t& dn : image.pixels()) dn = static_cast<std::uint16_t>(level);
+    Tracker tracker(TrackerSpec{}, kSide_px, kSide_px);
+    const Command command = answer(tracker, bytes_of(image));
+    EXPECT_EQ(command.kind, CommandKind::kReport) << level;
+    EXPECT_EQ(command.detection.confidence, 0.0F) << level;
+  }
+}
+
+TEST(Tracker, OneHotPixelIsNoTarget) {
+  for (const PixelPoint place : {PixelPoint{40, 50}, {0, 0}, {127, 127}, {0, 64}}) {
+    engine::DnImage image = dark_sky();
+    image.at(static_cast<int>(place.u), static_cast<int>(place.v)) = kWhite_dn;
+    Tracker tracker(TrackerSpec{}, kSide_px, kSide_px);
+    const Command command = answer(tracker, bytes_of(image));
+    EXPECT_EQ(command.kind, CommandKind::kReport) << place.u;
+    EXPECT_EQ(command.detection.confidence, 0.0F) << place.u;
+  }
+}
+
+TEST(Tracker, AHotPixelFarFromTheTargetDoesNotPullItsCentroid) {
+  engine::DnImage image = spot_at({40.3, 70.6});
+  image.at(110, 10) = kWhite_dn;
+  Tracker tracker(TrackerSpec{}, kSide_px, kSide_px);
+  const Command command = answer(tracker, bytes_of(image));
+  EXPECT_NEAR(command.detection.centroid_px.u, 40.3, kCentroid_px);
+  EXPECT_NEAR(command.detection.centroid_px.v, 70.6, kCentroid_px);
+}
+
+TEST(Tracker, AsksForTheTrimThatPutsTheTargetOnTheBoresight) {
+  const TrackerSpec spec;
+  Tracker tracker(spec, kSide_px, kSide_px);
+  // 10 px to the right and 6 up, while a trim of (3e-5, -1e-5) was on: that one, and 10 px and -6
+  // px more. The boresight's place is the centre of pixel (64, 64).
+  const hil::TrimAngles on{3e-5, -1e-5};
+  const Command command =
+      answer(tracker, bytes_of(spot_at({kCentre_px + 10.0, kCentre_px - 6.0}), 1, Duration{}, on));
+  EXPECT_EQ(command.kind, CommandKind::kTrim);
+  EXPECT_NEAR(command.trim_offset_rad[0], on[0] + 10.0 * spec.ifov_rad,
+              kCentroid_px * spec.ifov_rad);
+  EXPECT_NEAR(command.trim_offset_rad[1], on[1] - 6.0 * spec.ifov_rad,
+              kCentroid_px * spec.ifov_rad);
+  EXPECT_EQ(command.trim_rate_rad_s, hil::TrimAngles{});
+  // One frame says where, at mid-exposure, and not how fast.
+  EXPECT_EQ(command.reference, engine::sim_time(1000.0) + Duration(500'000));
+}
+
+TEST(Tracker, LearnsTheRateOfATargetThatMovesEvenly) {
+  const TrackerSpec spec;
+  constexpr double kPeriod_s = 0.1;
+  constexpr double kRate_px = 0.8;  // a frame, to the right; half of that down
+  Tracker tracker(spec, kSide_px, kSide_px);
+  Command command;
+  for (unsigned k = 0; k <= 60; ++k) {
+    const PixelPoint place{30.0 + kRate_px * k, 40.0 + 0.5 * kRate_px * k};
+    command = answer(tracker,
+                     bytes_of(spot_at(place, 800, k + 1), k, engine::from_seconds(kPeriod_s * k)));
+  }
+  // An alpha-beta filter passes noise on to its rate with a gain of sqrt(2 beta^2 / (alpha (4 - 2
+  // alpha - beta))) = 0.24 a period (alpha 0.5, beta 0.2; Kalata 1984), and its first surprise is
+  // gone after 60 frames. Of 0.05 px of centroid that is 0.012 px a frame; five sigma.
+  const double px_a_frame = spec.ifov_rad / kPeriod_s;
+  EXPECT_NEAR(command.trim_rate_rad_s[0], kRate_px * px_a_frame, 0.06 * px_a_frame);
+  EXPECT_NEAR(command.trim_rate_rad_s[1], 0.5 * kRate_px * px_a_frame, 0.06 * px_a_frame);
+  // A ramp leaves an alpha-beta filter no lag.
+  EXPECT_NEAR(command.trim_offset_rad[0], (30.0 + kRate_px * 60 - kCentre_px) * spec.ifov_rad,
+              kCentroid_px * spec.ifov_rad);
+}
+
+TEST(Tracker, ATargetHeldStillByAMovingTrimIsJustAsFast) {
+  const TrackerSpec spec;
+  constexpr double kPeriod_s = 0.1;
+  constexpr double kRate_rad_s = 50e-6;
+  Tracker tracker(spec, kSide_px, kSide_px);
+  Command command;
+  for (unsigned k = 0; k <= 60; ++k) {
+    command = answer(tracker,
+                     bytes_of(spot_at({64, 64}, 800, k + 1), k, engine::from_seconds(kPeriod_s * k),
+                              {kRate_rad_s * kPeriod_s * k, 0.0}));
+  }
+  EXPECT_NEAR(command.trim_rate_rad_s[0], kRate_rad_s, 0.06 * spec.ifov_rad / kPeriod_s);
+  EXPECT_NEAR(command.trim_rate_rad_s[1], 0.0, 0.06 * spec.ifov_rad / kPeriod_s);
+}
+
+TEST(Tracker, GarbageIsCountedAndLeftAlone) {
+  Tracker tracker(TrackerSpec{}, kSide_px, kSide_px);
+  std::mt19937 random(3);
+  std::uint64_t bad = 0;
+  for (int i = 0; i < 1000; ++i) {
+    std::vector<std::byte> bytes(random() % 400);
+    for (std::byte& b : bytes) b = static_cast<std::byte>(random());
+    EXPECT_FALSE(tracker.on_frame(bytes).has_value());
+    EXPECT_EQ(tracker.bad_frames(), ++bad);
+  }
+  std::vector<std::byte> damaged = bytes_of(spot_at({64, 64}));
+  damaged[5000] ^= std::byte{1};
+  EXPECT_FALSE(tracker.on_frame(damaged).has_value());
+  EXPECT_EQ(tracker.bad_frames(), ++bad);
+  // It has not learnt anything from that, and a good frame is answered.
+  const Command command = answer(tracker, bytes_of(spot_at({70, 64})));
+  EXPECT_EQ(command.sequence, 0U);
+  EXPECT_NEAR(command.detection.centroid_px.u, 70.0, kCentroid_px);
+  EXPECT_EQ(tracker.bad_frames(), bad);
+}
+
+TEST(Tracker, AFrameOfAnotherSizeIsRefused) {
+  Tracker tracker(TrackerSpec{}, kSide_px, kSide_px);
+  std::uint64_t bad = 0;
+  for (const auto& [width, height] : {std::pair{127, 128}, {128, 127}, {64, 256}, {1, 1}}) {
+    const engine::DnImage image(width, height);
+    EXPECT_FALSE(tracker.on_frame(bytes_of(image)).has_value());
+    EXPECT_EQ(tracker.bad_frames(), ++bad);
+  }
+}
+
+TEST(Tracker, SaturatedFramesAreAnsweredWithFiniteNumbers) {
+  for (const double peak_dn : {3e3, 3e4, 3e6, 1e9}) {
+    for (const PixelPoint centre : {PixelPoint{64, 64}, {0, 0}, {127, 64}}) {
+      Tracker tracker(TrackerSpec{}, kSide_px, kSide_px);
+      const Command command = answer(tracker, bytes_of(spot_at(centre, peak_dn)));
+      EXPECT_TRUE(std::isfinite(command.detection.centroid_px.u));
+      EXPECT_TRUE(std::isfinite(command.trim_offset_rad[0]));
+    }
+  }
+  // Values that eleven bits cannot hold.
+  engine::DnImage image = dark_sky();
+  for (int v = 50; v < 80; ++v)
+    for (int u = 50; u < 80; ++u) image.at(u, v) = 65535;
+  Tracker tracker(TrackerSpec{}, kSide_px, kSide_px);
+  EXPECT_TRUE(std::isfinite(answer(tracker, bytes_of(image)).detection.centroid_px.u));
+}
+
+TEST(Tracker, ARoundSpotThatSaturatesKeepsItsCentre) {
+  // Clipped evenly all around: there is nothing to lose but its own light.
+  Tracker tracker(TrackerSpec{}, kSide_px, kSide_px);
+  const Command command = answer(tracker, bytes_of(spot_at({60.0, 70.0}, 2e4)));
+  EXPECT_NEAR(command.detection.centroid_px.u, 60.0, kCentroid_px);
+  EXPECT_NEAR(command.detection.centroid_px.v, 70.0, kCentroid_px);
+}
+
+TEST(Tracker, TwoFramesOfTheSameInstantDoNotMakeARateOfInfinity) {
+  Tracker tracker(TrackerSpec{}, kSide_px, kSide_px);
+  answer(tracker, bytes_of(spot_at({60, 60}), 0));
+  for (const Duration later : {Duration{}, Duration(-1'000'000'000)}) {
+    const Command command = answer(tracker, bytes_of(spot_at({70, 60}), 1, later));
+    EXPECT_TRUE(std::isfinite(command.trim_rate_rad_s[0]));
+    EXPECT_EQ(command.trim_rate_rad_s[0], 0.0);
+  }
+}
+
+TEST(Tracker, ReportsOnlyMeansThatItAsksForNothing) {
+  TrackerSpec spec;
+  spec.reports_only = true;
+  Tracker tracker(spec, kSide_px, kSide_px);
+  for (unsigned k = 0; k < 5; ++k) {
+    const Command command =
+        answer(tracker, bytes_of(spot_at({50.0 + k, 60.0}), k, engine::from_seconds(0.1 * k)));
+    EXPECT_EQ(command.kind, CommandKind::kReport);
+    EXPECT_GT(command.detection.confidence, 0.0F);
+    EXPECT_EQ(command.trim_offset_rad, hil::TrimAngles{});
+  }
+}
+
+}  // namespace
