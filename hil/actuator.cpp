@@ -45,7 +45,7 @@ void Actuator::step(Duration d) noexcept {
   const double dt = engine::seconds(d);
   // No command, however absurd, asks for more than half a turn: what follows stays finite.
   const double wanted =
-      std::clamp(target_rad_ + target_rate_rad_s_ * engine::seconds(now_ - target_time_),
+      std::clamp(target_rad_ + target_rate_rad_s_ * (engine::seconds(now_) - engine::seconds(target_time_)),
                  -engine::kPi, engine::kPi);
   now_ += d;
   const double acceleration =

@@ -78,7 +78,7 @@ double Facets::reflected(const Facet& facet, double side, const Vector3d& to_lam
   const Vector3d normal = side * facet.normal.cast<double>();
   const double width_rad = brdf.lobe_half_width_rad();
   const double off_mirror = angle_between_rad(normal, to_lamp + to_camera);
-  if (facet.spread_rad < kFlat_rad ||
+  if (facet.spread_rad < kFlat_rad || width_rad == 0.0 ||
       off_mirror > static_cast<double>(facet.spread_rad) + kLobeReach * width_rad) {
     return with_normal(normal);
   }

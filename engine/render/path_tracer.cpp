@@ -44,7 +44,7 @@ RenderSpec read_render(const ConfigTable& table) {
   spec.samples_per_pixel =
       static_cast<int>(table.integer_or("samples_per_pixel", 50, between(1, 100000)));
   spec.bounces = static_cast<int>(table.integer_or("bounces", 1, between(0, 16)));
-  spec.bounce_share = table.number_or("bounce_share", 0.25, between(0.001, 1.0));
+  spec.bounce_share = table.number_or("bounce_share", 0.15, between(0.001, 1.0));
   return spec;
 }
 

@@ -15,7 +15,7 @@ namespace engine {
 struct RenderSpec {
   int samples_per_pixel = 50;  ///< shared by the cells of a pixel, rounded up
   int bounces = 1;             ///< indirect bounces; 0 leaves direct light alone
-  double bounce_share = 0.25;  ///< in (0, 1]: of the samples that follow the first bounce
+  double bounce_share = 0.15;  ///< in (0, 1]: of the samples that follow the first bounce
   CameraGeometry camera;
   GridWish grid;
 };

@@ -148,7 +148,8 @@ void Brdf::tabulate_albedo() {
   if (p_.kb == 0.0) return;
   // Integral of f cos_out over out, by the half vector: dw_out = 4 (i.h) dw_h. Even steps in the
   // lobe's own distribution put the points where the energy is.
-  constexpr int kTurns = 64;
+  // One half of the azimuths: the other is its mirror image.
+  constexpr int kTurns = 32;
   for (std::size_t a = 0; a < specular_albedo_.size(); ++a) {
     const double cos_in = (static_cast<double>(a) + 0.5) / kAngles;
     const Vector3d in(std::sqrt(1.0 - cos_in * cos_in), 0.0, cos_in);
@@ -158,7 +159,7 @@ void Brdf::tabulate_albedo() {
       const double x = lobe_edges_[cell] + 0.5 * width;
       const double sin_h = std::sqrt(x * (2.0 - x));
       for (int turn = 0; turn < kTurns; ++turn) {
-        const double azimuth = 2.0 * kPi * (turn + 0.5) / kTurns;
+        const double azimuth = kPi * (turn + 0.5) / kTurns;
         const Vector3d h(sin_h * std::cos(azimuth), sin_h * std::sin(azimuth), 1.0 - x);
         const double ih = in.dot(h);
         const Vector3d out = 2.0 * ih * h - in;

@@ -19,19 +19,20 @@ TEST(ClosedLoop, HoldsTheTargetToHalfAPixelThroughThePapersPass) {
   const auto report =
       nlohmann::json::parse(program::content_of(folder.path() / "latest" / "report.json"));
   // The pass lasts 40.15 s at ten frames a second, and lockstep keeps them all.
-  const nlohmann::json& frames = report["frames"];
-  EXPECT_EQ(frames["due"], 402);
-  EXPECT_EQ(frames["sent"], 402);
-  EXPECT_EQ(report["commands"]["taken"], 402);
-  EXPECT_EQ(report["commands"]["lost"], 0);
-  EXPECT_EQ(report["answer_missing"], false);
+  const nlohmann::json& frames = report.at("frames");
+  EXPECT_EQ(frames.at("due"), 402);
+  EXPECT_EQ(frames.at("sent"), 402);
+  EXPECT_EQ(report.at("commands").at("taken"), 402);
+  EXPECT_EQ(report.at("commands").at("lost"), 0);
+  EXPECT_EQ(report.at("answer_missing"), false);
 
-  const nlohmann::json& pointing = report["pointing"];
-  EXPECT_EQ(pointing["after_s"], 5.0);
-  EXPECT_EQ(pointing["frames"], 352);
-  EXPECT_EQ(pointing["frames_without_target"], 0);
-  EXPECT_TRUE(pointing["lost_after_s"].is_null());
-  EXPECT_LE(pointing["rms_px"].get<double>(), 0.5) << "worst: " << pointing["worst_px"] << " px";
+  const nlohmann::json& pointing = report.at("pointing");
+  EXPECT_EQ(pointing.at("after_s"), 5.0);
+  EXPECT_EQ(pointing.at("frames"), 352);
+  EXPECT_EQ(pointing.at("frames_without_target"), 0);
+  EXPECT_TRUE(pointing.at("lost_after_s").is_null());
+  EXPECT_LE(pointing.at("rms_px").get<double>(), 0.5)
+      << "worst: " << pointing.at("worst_px") << " px";
   EXPECT_EQ(run.exit_code, 0) << run.err;
 }
 

@@ -74,7 +74,7 @@ TEST(Scenario, ThePapersPassLoads) {
   EXPECT_EQ(s.run.pass, 3U);
   EXPECT_EQ(s.run.exposure, engine::Duration(1'000'000));
   EXPECT_EQ(s.run.period, engine::Duration(100'000'000));
-  EXPECT_EQ(s.run.command_lead, engine::Duration(20'000'000));
+  EXPECT_EQ(s.run.command_lead, engine::Duration(10'000'000));
   EXPECT_DOUBLE_EQ(s.camera_orbit.semi_major_axis_m, 6868.8546e3);
   EXPECT_DOUBLE_EQ(s.scene.camera.pixel_pitch_m, 6.5e-6);
   EXPECT_EQ(s.scene.camera.width_px, 1024);
@@ -136,7 +136,7 @@ const std::vector<BadValue> kBadValues = {
     {"run.record_every=0", "run.record_every", "got 0"},
     {"run.clock=sundial", "run.clock",
      "must be one of \"realtime\", \"lockstep\", got \"sundial\""},
-    {"run.exposure_ms=80.001", "run.exposure_ms", "must fit into one period"},
+    {"run.exposure_ms=90.001", "run.exposure_ms", "must fit into one period"},
     {"scenario.epoch=yesterday", "scenario.epoch", "must be a UTC date"},
     {"scenario.epoch=2022-13-01T00:00:00", "scenario.epoch", "must be a UTC date"},
     {"scenario.name=a/b", "scenario.name", "usable as a folder's name"},

@@ -155,7 +155,8 @@ Verdict judge(const Scenario& scenario, const RunLog& log, bool open_loop) {
 }
 
 void write_report(const fs::path& folder, const Scenario& s, const engine::Pass& pass,
-                  const RunLog& log, const Verdict& v, bool open_loop, int threads) {
+                  const RunLog& log, const Verdict& v, const PngRecorder& recorder, bool open_loop,
+                  int threads) {
   const hil::LoopReport& l = log.loop;
   nlohmann::ordered_json report = {
       {"scenario", s.name},
@@ -183,6 +184,7 @@ void write_report(const fs::path& folder, const Scenario& s, const engine::Pass&
        {{"ifov_rad", s.scene.camera.ifov_rad()},
         {"width_px", s.scene.camera.width_px},
         {"height_px", s.scene.camera.height_px}}},
+      {"pictures", {{"written", recorder.written()}, {"left_out", recorder.left_out()}}},
       {"answer_missing", l.answer_missing},
       {"command_latency_frames", 1},
       {"pointing",
@@ -238,7 +240,8 @@ int run_pass(const CommonOptions& options, const RunOptions& run) {
       run.open_loop ? "; open loop" : "");
 
   drivers::MockLink link(spec.width_px, spec.height_px);
-  PngRecorder recorder(folder, scenario.run.record_every, spec.width_px, spec.height_px);
+  PngRecorder recorder(folder, scenario.run.record_every, spec.width_px, spec.height_px,
+                       spec.when_busy);
   hil::FanOut sinks(link, recorder);
   tracker::TrackerSpec tracker_spec = scenario.tracker;
   tracker_spec.reports_only = run.open_loop;
@@ -263,7 +266,7 @@ int run_pass(const CommonOptions& options, const RunOptions& run) {
   const RunLog& log = observer.log();
   const Verdict verdict = judge(scenario, log, run.open_loop);
   write_tables(folder, scenario, log);
-  write_report(folder, scenario, pass, log, verdict, run.open_loop, rig.threads());
+  write_report(folder, scenario, pass, log, verdict, recorder, run.open_loop, rig.threads());
   print_summary(log, verdict, scenario, run.open_loop);
   if (!draw_pictures(folder, run.compare))
     spdlog::warn(

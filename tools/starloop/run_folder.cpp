@@ -19,12 +19,14 @@ namespace starloop {
 namespace fs = std::filesystem;
 using engine::seconds;
 
-PngRecorder::PngRecorder(fs::path folder, std::uint64_t every, int width_px, int height_px)
-    : folder_(std::move(folder)), every_(every) {
+PngRecorder::PngRecorder(fs::path folder, std::uint64_t every, int width_px, int height_px,
+                         hil::WhenBusy when_busy)
+    : folder_(std::move(folder)), every_(every), when_busy_(when_busy) {
   for (std::size_t i = 0; i < kSlots; ++i) {
     slots_[i].pixels.resize(width_px, height_px);
     ENSURE(free_.push(i));
   }
+  free_count_.release(kSlots);
   writer_ = std::jthread([this] { write_pictures(); });
 }
 
@@ -37,10 +39,12 @@ void PngRecorder::finish() {
   writer_.join();
 }
 
-engine::Status PngRecorder::send(const hil::Frame& frame, engine::Duration /*timeout*/) noexcept {
+engine::Status PngRecorder::send(const hil::Frame& frame, engine::Duration timeout) noexcept {
   if (frame.sequence % every_ != 0) return engine::Done{};
+  const bool free = when_busy_ == hil::WhenBusy::kWait ? free_count_.try_acquire_for(timeout)
+                                                       : free_count_.try_acquire();
   std::size_t i = 0;
-  if (!free_.pop(i)) {
+  if (!free || !free_.pop(i)) {
     ++left_out_;
     return engine::Error{engine::Fault::kBusy, 0, "recorder"};
   }
@@ -74,6 +78,7 @@ void PngRecorder::write_pictures() noexcept {
       std::fprintf(stderr, "starloop: %s\n", e.what());
     }
     ENSURE(free_.push(i));
+    free_count_.release();
   }
 }
 

@@ -19,7 +19,8 @@ namespace starloop {
 /// its own; when the disk is slow a picture is left out and counted, and nobody waits.
 class PngRecorder final : public hil::FrameSink {
  public:
-  PngRecorder(std::filesystem::path folder, std::uint64_t every, int width_px, int height_px);
+  PngRecorder(std::filesystem::path folder, std::uint64_t every, int width_px, int height_px,
+              hil::WhenBusy when_busy);
   ~PngRecorder() override;
 
   engine::Status send(const hil::Frame& frame, engine::Duration timeout) noexcept override;
@@ -39,11 +40,13 @@ class PngRecorder final : public hil::FrameSink {
 
   std::filesystem::path folder_;
   std::uint64_t every_;
+  hil::WhenBusy when_busy_;
   std::array<Slot, kSlots> slots_;
   std::atomic<bool> done_{false};
   hil::SpscRing<std::size_t, kSlots> ready_;  // sender -> writer
   hil::SpscRing<std::size_t, kSlots> free_;   // writer -> sender
   std::counting_semaphore<> ready_count_{0};
+  std::counting_semaphore<> free_count_{0};
   std::uint64_t left_out_ = 0;  // the sender's own
   std::uint64_t written_ = 0;   // the writer's own until it is joined
   std::jthread writer_;

@@ -19,9 +19,9 @@ enum class ClockMode : std::uint8_t { kRealtime, kLockstep };
 
 /// How a run goes: when, how fast, what is kept.
 struct RunSpec {
-  std::size_t pass = 1;   ///< counted from 1
-  std::string pass_where;   ///< the place in the scenario that says so
-  double duration_s = 0;  ///< 0: the whole pass
+  std::size_t pass = 1;    ///< counted from 1
+  std::string pass_where;  ///< the place in the scenario that says so
+  double duration_s = 0;   ///< 0: the whole pass
   engine::Duration exposure{};
   engine::Duration period{};
   engine::Duration command_lead{};

@@ -109,7 +109,7 @@ TEST(SolveKepler, StaysInTheTurnForAnyFiniteMeanAnomaly) {
   EXPECT_EQ(solve_kepler(0.5, kPi).rad, kPi);
 }
 
-TEST(KeplerPropagator, AgreesWithFiftyDigitArithmetic) {
+TEST(KeplerPropagator, AgreesWithThe25DigitReference) {
   const test_support::Flyby flyby;
   const Csv reference("orbits_reference.csv");
   for (const Csv::Row& row : reference.rows()) {
