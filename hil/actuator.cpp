@@ -44,9 +44,9 @@ void Actuator::advance_to(SimTime t) noexcept {
 void Actuator::step(Duration d) noexcept {
   const double dt = engine::seconds(d);
   // No command, however absurd, asks for more than half a turn: what follows stays finite.
-  const double wanted =
-      std::clamp(target_rad_ + target_rate_rad_s_ * (engine::seconds(now_) - engine::seconds(target_time_)),
-                 -engine::kPi, engine::kPi);
+  const double wanted = std::clamp(
+      target_rad_ + target_rate_rad_s_ * (engine::seconds(now_) - engine::seconds(target_time_)),
+      -engine::kPi, engine::kPi);
   now_ += d;
   const double acceleration =
       stiffness_1_s2_ * (wanted - angle_rad_) + damping_1_s_ * (target_rate_rad_s_ - rate_rad_s_);

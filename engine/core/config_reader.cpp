@@ -125,7 +125,7 @@ void ConfigReader::set(const std::string& assignment) {
   for (std::string part; std::getline(parts, part, '.');) {
     if (table->get(part) == nullptr) table->insert(part, toml::table{});
     table = table->get(part)->as_table();
-    if (table == nullptr) throw ConfigError(origin + ": " + part + " is a value, not a table");
+    if (table == nullptr) throw ConfigError(origin + ": " += part += " is a value, not a table");
   }
   const std::string key = path.substr(last_dot + 1);
   if (const auto* old = table->get(key); old != nullptr && old->is_table())

@@ -88,8 +88,10 @@ double Facets::reflected(const Facet& facet, double side, const Vector3d& to_lam
   double sum = 0;
   for (int i = 0; i < n; ++i) {
     for (int j = 0; j < 2 * (n - i) - 1; ++j) {
-      const double third = (i + (j % 2 == 0 ? 1.0 : 2.0) / 3.0) / n;
-      const double second = (j / 2 + (j % 2 == 0 ? 1.0 : 2.0) / 3.0) / n;
+      const int column = j / 2;
+      const double middle = (j % 2 == 0 ? 1.0 : 2.0) / 3.0;  // of the two triangles of a square
+      const double third = (i + middle) / n;
+      const double second = (column + middle) / n;
       const Vector3d smooth = (1.0 - second - third) * facet.normals[0].cast<double>() +
                               second * facet.normals[1].cast<double>() +
                               third * facet.normals[2].cast<double>();

@@ -24,14 +24,17 @@ PixelPoint spread_point(int i, float shift_u, float shift_v) noexcept {
   return {u - std::floor(u), v - std::floor(v)};
 }
 
+std::string material_missing(const std::string& name) {
+  return "the target's mesh has a material \"" + name + "\", the scenario has no table materials." +
+         name;
+}
+
 std::vector<Brdf> in_mesh_order(const Mesh& mesh, const std::vector<Material>& materials) {
   std::vector<Brdf> brdfs;
   for (const std::string& name : mesh.material_names) {
     const auto it = std::find_if(materials.begin(), materials.end(),
                                  [&](const Material& m) { return m.name == name; });
-    if (it == materials.end())
-      throw ConfigError("the target's mesh has a material \"" + name +
-                        "\", the scenario has no table materials." + name);
+    if (it == materials.end()) throw ConfigError(material_missing(name));
     brdfs.push_back(it->brdf);
   }
   return brdfs;
@@ -115,11 +118,12 @@ void PathTracer::trace_pixel_row(const Snapshot& snapshot, const View& view, int
       const Draws draws(snapshot.seed, Stream::kLight, snapshot.sequence, place);
       trace_pixel(snapshot, view, samples_per_cell,
                   {static_cast<double>(u), static_cast<double>(v)}, draws,
-                  std::span(cells).first(static_cast<std::size_t>(s * s)), counts);
+                  std::span(cells).first(static_cast<std::size_t>(s) * static_cast<std::size_t>(s)),
+                  counts);
     }
+    auto cell = cells.begin();
     for (int y = 0; y < s; ++y)
-      for (int x = 0; x < s; ++x)
-        out.grid.at(column * s + x, row * s + y) = cells[static_cast<std::size_t>(y * s + x)];
+      for (int x = 0; x < s; ++x) out.grid.at(column * s + x, row * s + y) = *cell++;
   }
 }
 
@@ -138,8 +142,10 @@ void PathTracer::trace_pixel(const Snapshot& snapshot, const View& view, int sam
     for (int lane = 0; lane < lanes; ++lane) {
       const int cell = (first + lane) / samples_per_cell;
       const PixelPoint in_cell = spread_point(first + lane, shift_u, shift_v);
-      const double u = pixel.u - 0.5 + (cell % s + in_cell.u) / s;
-      const double v = pixel.v - 0.5 + (cell / s + in_cell.v) / s;
+      const int cell_column = cell % s;
+      const int cell_row = cell / s;
+      const double u = pixel.u - 0.5 + (cell_column + in_cell.u) / s;
+      const double v = pixel.v - 0.5 + (cell_row + in_cell.v) / s;
       const Vector3d direction = view.at_zero + u * view.per_u + v * view.per_v;
       rays.set(lane, (view.origin + view.advance * direction).cast<float>(),
                direction.cast<float>());

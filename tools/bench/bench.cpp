@@ -1,7 +1,7 @@
-// What each model costs. Machines are shared and noisy: compare lines of one run with each other, or
-// two builds run in turn, never with a number from another day.
+// What each model costs. Machines are shared and noisy: compare lines of one run with each other,
+// or two builds run in turn, never with a number from another day.
 //   build/release/bench                       everything
-//   build/release/bench --benchmark_filter=Frame
+//   build/release/bench --benchmark_filter=frame
 #include <benchmark/benchmark.h>
 
 #include "drivers/frame_packet.h"
@@ -18,50 +18,50 @@ starloop::Scenario flyby() {
   return starloop::load_scenario(options);
 }
 
-void Kepler(benchmark::State& state) {
+void bench_kepler(benchmark::State& state) {
   const double e = 1.0 - std::pow(10.0, -static_cast<double>(state.range(0)));
   double m = 0.0;
   for (auto _ : state) benchmark::DoNotOptimize(solve_kepler(e, m += 0.7));
 }
-BENCHMARK(Kepler)->ArgName("digits_of_e_from_1")->Arg(0)->Arg(2)->Arg(6)->Arg(12);
+BENCHMARK(bench_kepler)->ArgName("digits_of_e_from_1")->Arg(0)->Arg(2)->Arg(6)->Arg(12);
 
-void Sun(benchmark::State& state) {
+void bench_sun(benchmark::State& state) {
   const auto model = state.range(0) == 0 ? SunModel::kTable1 : SunModel::kErfa;
   Epoch t{};
   for (auto _ : state) benchmark::DoNotOptimize(sun_position(model, t += Duration(1'000'000)));
 }
-BENCHMARK(Sun)->ArgName("table1_erfa")->Arg(0)->Arg(1);
+BENCHMARK(bench_sun)->ArgName("table1_erfa")->Arg(0)->Arg(1);
 
-void PassesOf15Days(benchmark::State& state) {
+void bench_passes_of_15_days(benchmark::State& state) {
   const starloop::Scenario scenario = flyby();
   for (auto _ : state) benchmark::DoNotOptimize(starloop::passes_of(scenario));
 }
-BENCHMARK(PassesOf15Days)->Unit(benchmark::kMillisecond);
+BENCHMARK(bench_passes_of_15_days)->Unit(benchmark::kMillisecond);
 
-void Earthshine(benchmark::State& state) {
+void bench_earthshine(benchmark::State& state) {
   const Position<J2000> target{{0.0, 0.0, 6.8e6}};
   const auto to_sun = direction_of<J2000>({1.0, 0.0, 0.2});
   for (auto _ : state) benchmark::DoNotOptimize(earthshine_vector(target, to_sun, 0.3, 1.0));
 }
-BENCHMARK(Earthshine);
+BENCHMARK(bench_earthshine);
 
-void BrdfEval(benchmark::State& state) {
+void bench_brdf_eval(benchmark::State& state) {
   const Brdf brdf({}, state.range(0) == 0 ? Brdf::Variant::kPhysical : Brdf::Variant::kPaper);
   const Eigen::Vector3d in = Eigen::Vector3d(0.3, 0.2, 0.8).normalized();
   const Eigen::Vector3d out = Eigen::Vector3d(-0.3, -0.1, 0.8).normalized();
   for (auto _ : state) benchmark::DoNotOptimize(brdf.eval(in, out));
 }
-BENCHMARK(BrdfEval)->ArgName("physical_paper")->Arg(0)->Arg(1);
+BENCHMARK(bench_brdf_eval)->ArgName("physical_paper")->Arg(0)->Arg(1);
 
-void Poisson(benchmark::State& state) {
+void bench_poisson(benchmark::State& state) {
   const double mean = std::pow(10.0, static_cast<double>(state.range(0)));
   Draws draws(1, Stream::kShot, 0, 0);
   for (auto _ : state) benchmark::DoNotOptimize(draws.poisson(mean));
 }
-BENCHMARK(Poisson)->ArgName("log10_mean")->DenseRange(-2, 4, 1);
+BENCHMARK(bench_poisson)->ArgName("log10_mean")->DenseRange(-2, 4, 1);
 
 /// A whole frame of the paper's pass, so many seconds after its closest point; stages as counters.
-void Frame(benchmark::State& state) {
+void bench_frame(benchmark::State& state) {
   const starloop::Scenario scenario = flyby();
   starloop::Rig rig(scenario, static_cast<int>(state.range(1)));
   hil::ScriptedPointing pointing = rig.prediction();
@@ -90,13 +90,13 @@ void Frame(benchmark::State& state) {
   state.counters["range_km"] = report.truth.range_m * 1e-3;
   state.counters["rays"] = static_cast<double>(report.render.rays);
 }
-BENCHMARK(Frame)
+BENCHMARK(bench_frame)
     ->ArgNames({"s_after_closest", "threads"})
     ->ArgsProduct({{0, 5, 10, 20}, {1, 2}})
     ->Unit(benchmark::kMillisecond)
     ->UseRealTime();
 
-void FramePacket(benchmark::State& state) {
+void bench_frame_packet(benchmark::State& state) {
   const DnImage image(1024, 1024);
   hil::Frame frame;
   frame.pixels = &image;
@@ -106,7 +106,7 @@ void FramePacket(benchmark::State& state) {
     if (state.range(0) == 1) benchmark::DoNotOptimize(drivers::decode_frame(bytes));
   }
 }
-BENCHMARK(FramePacket)->ArgName("and_decode")->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond);
+BENCHMARK(bench_frame_packet)->ArgName("and_decode")->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 

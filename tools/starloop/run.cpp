@@ -83,7 +83,7 @@ class Observer {
     std::printf(
         "frame %4llu/%llu  %7.2f km  %6.2f mrad/s  peak %4d DN  error %8.2f px  "
         "ms: render %5.1f optics %4.1f detector %4.1f  late %llu  dropped %llu %c",
-        static_cast<unsigned long long>(r.sequence + 1), static_cast<unsigned long long>(due_),
+        static_cast<unsigned long long>(r.sequence) + 1, static_cast<unsigned long long>(due_),
         t.range_m * 1e-3, t.line_of_sight_rate_rad_s * 1e3, r.report.peak_dn,
         std::hypot(t.photocentre_px.u - b.u, t.photocentre_px.v - b.v), seconds(s.render) * 1e3,
         seconds(s.optics) * 1e3, seconds(s.detector) * 1e3, static_cast<unsigned long long>(late_),
