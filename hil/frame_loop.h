@@ -58,7 +58,7 @@ struct LoopReport {
   std::uint64_t skipped = 0;         ///< whole periods that passed while we were still at work
   std::uint64_t dropped = 0;         ///< the link still held every slot
   std::uint64_t faults = 0;          ///< the link refused, timed out or was gone
-  std::uint64_t late = 0;            ///< exposed, but woken over a millisecond after the deadline
+  std::uint64_t late = 0;            ///< woken over a millisecond after the deadline
   std::uint64_t commands = 0;        ///< obeyed
   std::uint64_t command_faults = 0;  ///< packets that were none
   std::uint64_t commands_lost = 0;   ///< came faster than a slot could take them

@@ -8,8 +8,7 @@ namespace hil {
 
 /// What the camera's roll is held to: the image's x grows away from it.
 enum class RollRule : std::uint8_t {
-  kCelestial,  ///< the Earth's axis: eq 8 of Li et al. 2023; turns fast where the line passes a
-               ///< pole
+  kCelestial,  ///< the Earth's axis: eq 8 of Li et al. 2023; turns fast near the celestial poles
   kVertical,   ///< the local vertical: x grows towards the Earth
 };
 

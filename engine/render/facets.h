@@ -37,8 +37,9 @@ struct SurfacePoint {
 ///
 /// Facets stand for a smooth surface: where a glint is near, a facet sends the mean over the
 /// normals of the surface it replaces. Flat facets would flash one after the other, three times too
-/// bright, and be dark between. Facets that meet at 40 deg or more are taken for an edge. Thread:
-/// loop. Loop-safe but for the constructor.
+/// bright, and be dark between. Facets that meet at 40 deg or more are taken for an edge.
+///
+/// Thread: loop. Loop-safe but for the constructor.
 class Facets {
  public:
   Facets(const Mesh& mesh, std::vector<Brdf> brdfs);

@@ -30,8 +30,10 @@ struct FiveParameters {
 ///    send back more than came in. Reciprocal. The printed kd/cos_i passes albedo 1 at 76 deg.
 ///  - `paper` keeps the printed terms, clamped so that the albedo stays 1 at most.
 ///  - `wrinkle_rad` > 0 blurs the lobe by the normals of a crinkled foil, normally distributed with
-///    this rms in each direction; the energy stays. A sample for a goniometer lies flat, a blanket
-///    on a spacecraft does not.
+///    this rms in each direction: a goniometer's sample lies flat, a blanket on a spacecraft does
+///    not. Our own assumption; neither the shape nor any rms is measured. The lobe keeps its
+///    integral; polyimide's albedo changes by 1 % at 3 deg of wrinkles, at 15 deg by -7 % in near
+///    normal light and +11 % at 80 deg.
 /// A Lambert surface is kb = 0. Leaves out colour and polarisation.
 class Brdf {
  public:
