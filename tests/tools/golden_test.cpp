@@ -62,8 +62,9 @@ TEST(Golden, EveryPictureIsRenderedAgain) {
       }
     EXPECT_GT(lit, 100);
     EXPECT_LE(differ, lit / 100);
-    if (differ > lit / 100) fs::copy_file(folder.path() / "frame.png", "golden_" + picture.name,
-                                          fs::copy_options::overwrite_existing);
+    if (differ > lit / 100)
+      fs::copy_file(folder.path() / "frame.png", "golden_" + picture.name,
+                    fs::copy_options::overwrite_existing);
   }
 }
 
