@@ -4,11 +4,12 @@
 #include <cmath>
 #include <cstring>
 
-#include "drivers/crc32c.h"
+#include "engine/core/crc32c.h"
 
 namespace drivers {
 namespace {
 
+using engine::crc32c;
 using engine::Duration;
 using engine::Error;
 using engine::Fault;
@@ -17,7 +18,6 @@ using engine::SimTime;
 static_assert(std::endian::native == std::endian::little, "the wire format is written as it lies");
 
 constexpr char kFrameMagic[4] = {'S', 'L', 'F', '1'};
-constexpr char kCommandMagic[4] = {'S', 'L', 'C', '1'};
 constexpr std::size_t kHeaderCrcAt = 92;
 
 template <class T>
@@ -33,23 +33,6 @@ template <class T>
 }
 
 Error rejected(const char* step) noexcept { return {Fault::kRejected, 0, step}; }
-
-/// What both kinds of packet share: magic and the header's checksum.
-const char* header_fault(std::span<const std::byte> in, const char (&magic)[4]) noexcept {
-  if (std::memcmp(in.data(), magic, sizeof magic) != 0) return "magic";
-  if (get<std::uint32_t>(in, kHeaderCrcAt) != crc32c(in.first(kHeaderCrcAt)))
-    return "header checksum";
-  return nullptr;
-}
-
-bool finite(const hil::Command& c) noexcept {
-  for (const double x : {c.trim_offset_rad[0], c.trim_offset_rad[1], c.trim_rate_rad_s[0],
-                         c.trim_rate_rad_s[1], c.detection.centroid_px.u, c.detection.centroid_px.v,
-                         static_cast<double>(c.detection.confidence)}) {
-    if (!std::isfinite(x)) return false;
-  }
-  return true;
-}
 
 }  // namespace
 
@@ -81,7 +64,9 @@ engine::Expected<std::size_t> encode_frame(const hil::Frame& frame,
 
 engine::Expected<FrameView> decode_frame(std::span<const std::byte> in) noexcept {
   if (in.size() < kFrameHeaderBytes) return rejected("shorter than a header");
-  if (const char* fault = header_fault(in, kFrameMagic); fault != nullptr) return rejected(fault);
+  if (std::memcmp(in.data(), kFrameMagic, sizeof kFrameMagic) != 0) return rejected("magic");
+  if (get<std::uint32_t>(in, kHeaderCrcAt) != crc32c(in.first(kHeaderCrcAt)))
+    return rejected("header checksum");
   if (get<std::uint16_t>(in, 4) != kFrameHeaderBytes) return rejected("header length");
   FrameView view;
   view.width_px = get<std::uint16_t>(in, 32);
@@ -105,42 +90,6 @@ engine::Expected<FrameView> decode_frame(std::span<const std::byte> in) noexcept
   if (!std::isfinite(view.frame.trim_rad[0]) || !std::isfinite(view.frame.trim_rad[1]))
     return rejected("a number that is not finite");
   return view;
-}
-
-void encode_command(const hil::Command& command, std::span<std::byte, kCommandBytes> out) noexcept {
-  std::memset(out.data(), 0, out.size());
-  put(out, 0, kCommandMagic);
-  put(out, 4, static_cast<std::uint8_t>(command.kind));
-  put(out, 8, command.sequence);
-  put(out, 16, command.answers_frame);
-  put(out, 24, command.trim_offset_rad);
-  put(out, 40, command.trim_rate_rad_s);
-  put(out, 56, command.reference.time_since_epoch().count());
-  put(out, 64, static_cast<float>(command.detection.centroid_px.u));
-  put(out, 68, static_cast<float>(command.detection.centroid_px.v));
-  put(out, 72, command.detection.confidence);
-  put(out, kHeaderCrcAt, crc32c(out.first(kHeaderCrcAt)));
-}
-
-engine::Expected<hil::Command> decode_command(std::span<const std::byte> in) noexcept {
-  if (in.size() != kCommandBytes) return rejected("length of a command");
-  if (const char* fault = header_fault(in, kCommandMagic); fault != nullptr) return rejected(fault);
-  const auto kind = get<std::uint8_t>(in, 4);
-  if (kind > static_cast<std::uint8_t>(hil::CommandKind::kTrim)) return rejected("kind of command");
-  hil::Command command;
-  command.kind = static_cast<hil::CommandKind>(kind);
-  command.sequence = get<std::uint64_t>(in, 8);
-  command.answers_frame = get<std::uint64_t>(in, 16);
-  command.trim_offset_rad = get<hil::TrimAngles>(in, 24);
-  command.trim_rate_rad_s = get<hil::TrimAngles>(in, 40);
-  command.reference = SimTime(Duration(get<std::int64_t>(in, 56)));
-  command.detection.centroid_px = {static_cast<double>(get<float>(in, 64)),
-                                   static_cast<double>(get<float>(in, 68))};
-  command.detection.confidence = get<float>(in, 72);
-  if (!finite(command)) return rejected("a number that is not finite");
-  if (command.detection.confidence < 0.0F || command.detection.confidence > 1.0F)
-    return rejected("a confidence outside 0 to 1");
-  return command;
 }
 
 }  // namespace drivers

@@ -8,7 +8,8 @@
 
 namespace drivers {
 
-/// The wire format: header, byte order, checksums; nothing else. All numbers little-endian.
+/// The wire format of frames: header, byte order, checksums; nothing else. All numbers
+/// little-endian. What comes back are the Space Packets of hil/space_packet.h.
 ///
 /// A frame is a 96-byte header and rows of pixels, 16 bits each, the value in the low bits:
 ///    0  4  "SLF1"             32  2  width in pixels         64  8  trim y, rad (double)
@@ -18,18 +19,9 @@ namespace drivers {
 ///   16  8  shutter open, ns   40 16  reserved, 0             92  4  CRC-32C of bytes 0 to 91
 ///   24  8  exposure, ns       56  8  trim x, rad (double)
 ///
-/// A command is 96 bytes:
-///    0  4  "SLC1"             24  8  trim x, rad (double)    64  4  centroid u, px (float)
-///    4  1  kind: 0 report,    32  8  trim y, rad             68  4  centroid v, px
-///          1 trim             40  8  trim rate x, rad/s      72  4  confidence, 0 to 1
-///    5  3  reserved, 0        48  8  trim rate y, rad/s      76 16  reserved, 0
-///    8  8  sequence           56  8  reference time, ns      92  4  CRC-32C of bytes 0 to 91
-///   16  8  frame it answers
-///
 /// Times are simulated nanoseconds after the scenario's epoch. Pixel (0, 0) has its centre at (0,
 /// 0).
 inline constexpr std::size_t kFrameHeaderBytes = 96;
-inline constexpr std::size_t kCommandBytes = 96;
 inline constexpr int kLargestSide_px = 4096;
 
 [[nodiscard]] constexpr std::size_t frame_bytes(int width_px, int height_px) noexcept {
@@ -50,10 +42,5 @@ struct FrameView {
 };
 /// kRejected, with the step that found it, for bytes that are not exactly one whole frame.
 [[nodiscard]] engine::Expected<FrameView> decode_frame(std::span<const std::byte> in) noexcept;
-
-void encode_command(const hil::Command& command, std::span<std::byte, kCommandBytes> out) noexcept;
-/// kRejected for anything that is not a command: wrong size, magic, checksum, kind, or a number
-/// that is not finite.
-[[nodiscard]] engine::Expected<hil::Command> decode_command(std::span<const std::byte> in) noexcept;
 
 }  // namespace drivers

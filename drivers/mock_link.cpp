@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "hil/space_packet.h"
+
 namespace drivers {
 
 using engine::Done;
@@ -33,7 +35,7 @@ Expected<hil::Command> MockLink::receive(Duration timeout) noexcept {
   if (!packet_count_.try_acquire_for(timeout)) return Error{Fault::kTimeout, 0, "mock: receive"};
   Packet packet;
   if (!packets_.pop(packet)) return Error{Fault::kTimeout, 0, "mock: receive"};
-  return decode_command(std::span(packet.bytes).first(packet.used));
+  return hil::decode_command(std::span(packet.bytes).first(packet.used));
 }
 
 Expected<std::span<const std::byte>> MockLink::next_frame(Duration timeout) noexcept {

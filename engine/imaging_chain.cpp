@@ -22,7 +22,8 @@ ImagingChain::ImagingChain(const SnapshotBuilder& scene, std::unique_ptr<Rendere
   radiance_.grid.reserve(most.width() * wish.oversampling, most.height() * wish.oversampling);
 }
 
-FrameReport ImagingChain::expose(const Shot& shot, Budget budget, DnImage& out) noexcept {
+FrameReport ImagingChain::expose(const Shot& shot, Budget budget, DnImage& out,
+                                 TruthMask& mask) noexcept {
   FrameReport report;
   const Duration start = now();
   const Snapshot snapshot = scene_.build(shot);
@@ -46,14 +47,15 @@ FrameReport ImagingChain::expose(const Shot& shot, Budget budget, DnImage& out) 
   truth.earthshine_w_m2 = snapshot.earthshine.irradiance_w_m2;
   truth.earth_behind = snapshot.earth_behind;
   truth.roll_is_fallback = snapshot.roll_is_fallback;
-  measure_light(report.optics.window, shot.exposure, truth);
+  measure_light(report.optics.window, shot.exposure, truth, mask);
   const auto pixels = out.pixels();
   report.peak_dn = *std::max_element(pixels.begin(), pixels.end());
   return report;
 }
 
 void ImagingChain::measure_light(const PixelRect& window, Duration exposure,
-                                 FrameTruth& truth) const noexcept {
+                                 FrameTruth& truth, TruthMask& mask) const noexcept {
+  mask.clear();
   const double background = radiance_.uniform_w_m2_sr * optics_.throughput_sr();
   double sum = 0;
   double sum_u = 0;

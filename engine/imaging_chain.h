@@ -19,13 +19,15 @@ class ImagingChain final : public SceneGenerator {
                const Detector& detector, const DetectorSpec& detector_spec,
                const CameraGeometry& camera, Stopwatch stopwatch = nullptr);
 
-  FrameReport expose(const Shot& shot, Budget budget, DnImage& out) noexcept override;
+  FrameReport expose(const Shot& shot, Budget budget, DnImage& out,
+                     TruthMask& mask) noexcept override;
 
  private:
   [[nodiscard]] Duration now() const noexcept {
     return stopwatch_ != nullptr ? stopwatch_() : Duration{};
   }
-  void measure_light(const PixelRect& window, Duration exposure, FrameTruth& truth) const noexcept;
+  void measure_light(const PixelRect& window, Duration exposure, FrameTruth& truth,
+                     TruthMask& mask) const noexcept;
 
   SnapshotBuilder scene_;
   std::unique_ptr<Renderer> renderer_;

@@ -1,6 +1,9 @@
 #pragma once
 
+#include <cstdint>
 #include <limits>
+#include <span>
+#include <vector>
 
 #include "engine/core/image.h"
 #include "engine/optics/optics.h"
@@ -22,10 +25,46 @@ struct FrameTruth {
                             std::numeric_limits<double>::quiet_NaN()};
   double smear_px = 0;
   double peak_e = 0;  ///< of the target's light
+  PixelRect box;      ///< around the mask; empty when the mask is
+  int mask_px = 0;    ///< pixels of the mask
+  /// Of all the mask's light against its shot noise and the sensor's own; 0 without a mask.
+  double signal_to_noise = 0;
+  double visible_fraction = 0;  ///< of the target's outline that lies in the frame, in [0, 1]
   double sun_irradiance_w_m2 = 0;
   double earthshine_w_m2 = 0;
   bool earth_behind = false;
   bool roll_is_fallback = false;
+};
+
+/// The pixels where the target's light is above one sigma of a dark pixel's noise, as runs of
+/// columns [begin, end), row by row from the top. Adding never allocates; what is too much is lost,
+/// and the mask says so.
+class TruthMask {
+ public:
+  struct Run {
+    std::uint16_t row = 0;
+    std::uint16_t begin = 0;
+    std::uint16_t end = 0;
+  };
+  explicit TruthMask(std::size_t most_runs = 0) { runs_.reserve(most_runs); }
+
+  void clear() noexcept {
+    runs_.clear();
+    truncated_ = false;
+  }
+  void add(const Run& run) noexcept {
+    if (runs_.size() < runs_.capacity()) {
+      runs_.push_back(run);
+    } else {
+      truncated_ = true;
+    }
+  }
+  [[nodiscard]] std::span<const Run> runs() const noexcept { return runs_; }
+  [[nodiscard]] bool truncated() const noexcept { return truncated_; }
+
+ private:
+  std::vector<Run> runs_;
+  bool truncated_ = false;
 };
 
 /// How long each stage took. All zero when nobody gave the chain a stopwatch.
@@ -49,8 +88,9 @@ struct FrameReport {
 class SceneGenerator {
  public:
   virtual ~SceneGenerator() = default;
-  /// Overwrites `out`.
-  virtual FrameReport expose(const Shot& shot, Budget budget, DnImage& out) noexcept = 0;
+  /// Overwrites `out` and `mask`.
+  virtual FrameReport expose(const Shot& shot, Budget budget, DnImage& out,
+                             TruthMask& mask) noexcept = 0;
 };
 
 }  // namespace engine

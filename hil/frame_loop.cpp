@@ -16,6 +16,7 @@ namespace {
 constexpr Duration kPatience{50'000'000};  // how often a waiting thread looks for the stop
 constexpr Duration kLateLimit{1'000'000};
 constexpr std::size_t kMostWaiting = 256;
+constexpr std::size_t kRunsPerRow = 8;  // of a truth mask, on average
 
 }  // namespace
 
@@ -33,6 +34,7 @@ FrameLoop::FrameLoop(const LoopSpec& spec, Clock& clock, PointingSource& pointin
   waiting_.reserve(kMostWaiting);
   for (std::size_t i = 0; i < kSlots; ++i) {
     slots_[i].pixels.resize(spec.width_px, spec.height_px);
+    slots_[i].mask = engine::TruthMask(kRunsPerRow * static_cast<std::size_t>(spec.height_px));
     ENSURE(free_.push(i));
   }
   free_count_.release(kSlots);
@@ -55,6 +57,7 @@ LoopReport FrameLoop::run(const std::stop_token& stop) {
     if (record.late > kLateLimit) ++report.late;
     std::size_t slot = 0;
     record.handed_over = acquire_slot(stop, slot);
+    counts_ = {report.skipped, report.dropped, report.late, report.commands};
     if (record.handed_over) {
       expose(k, slot, record);
     } else {
@@ -132,9 +135,19 @@ void FrameLoop::expose(std::uint64_t k, std::size_t slot, FrameRecord& record) n
   shot.attitude.open = pointing_.attitude(open);
   shot.attitude.middle = pointing_.attitude(open + spec_.exposure / 2);
   record.trim_rad = pointing_.trim_rad();
+  record.measured = pointing_.measured();
   shot.attitude.close = pointing_.attitude(open + spec_.exposure);
-  record.report = generator_.expose(shot, engine::Budget{}, s.pixels);
-  s.frame = {k, open, spec_.exposure, spec_.bits, record.trim_rad, &s.pixels};
+  record.report = generator_.expose(shot, engine::Budget{}, s.pixels, s.mask);
+  s.frame = {.sequence = k,
+             .shutter_open = open,
+             .exposure = spec_.exposure,
+             .bits = spec_.bits,
+             .trim_rad = record.trim_rad,
+             .measured = record.measured,
+             .counts = counts_,
+             .pixels = &s.pixels,
+             .telemetry_row = {},
+             .truth_mask = &s.mask};
   record.busy = std::max(Duration{}, clock_.now() - open - record.late);
   ENSURE(ready_.push(slot));
   ready_count_.release();

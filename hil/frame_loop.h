@@ -40,6 +40,7 @@ struct FrameRecord {
   engine::Duration busy{};  ///< from the wake-up to the hand-over to the sender, by the clock
   engine::FrameReport report;
   TrimAngles trim_rad{};
+  MeasuredAttitude measured;
   std::uint64_t skipped_before = 0;  ///< periods lost before this frame, because we were too slow
   bool handed_over = false;          ///< false: dropped, the link held every slot
 };
@@ -91,6 +92,7 @@ class FrameLoop {
   struct Slot {
     Frame frame;
     engine::DnImage pixels;
+    engine::TruthMask mask;
   };
 
   [[nodiscard]] engine::SimTime opening(std::uint64_t k) const noexcept {
@@ -124,6 +126,7 @@ class FrameLoop {
 
   std::vector<Command> waiting_;  // taken, not yet obeyed; the loop's own
   std::uint64_t skipped_before_ = 0;
+  LoopCounts counts_;
   LoopReport sender_counts_;    // the sender's own until it is joined
   LoopReport receiver_counts_;  // the receiver's own until it is joined
   FrameRing frames_;            // loop -> observer

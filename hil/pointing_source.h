@@ -15,6 +15,8 @@ class PointingSource {
   virtual void apply(const Command& command) noexcept = 0;
   /// What the actuator's own sensor says of the last attitude().
   [[nodiscard]] virtual TrimAngles trim_rad() const noexcept = 0;
+  /// What star tracker and gyro say of the last attitude(); nothing turns unless overridden.
+  [[nodiscard]] virtual MeasuredAttitude measured() const noexcept { return {}; }
 };
 
 }  // namespace hil

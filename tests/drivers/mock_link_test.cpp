@@ -1,14 +1,14 @@
 #include "drivers/mock_link.h"
 
-#include <array>
 #include <thread>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "hil/space_packet.h"
+
 namespace {
 
-using drivers::kCommandBytes;
 using drivers::MockLink;
 using engine::DnImage;
 using engine::Duration;
@@ -33,12 +33,11 @@ Frame frame_of(std::uint64_t sequence, const DnImage& pixels) {
   return frame;
 }
 
-std::array<std::byte, kCommandBytes> command_bytes(std::uint64_t sequence) {
+std::vector<std::byte> command_bytes(std::uint64_t sequence) {
   Command command;
   command.sequence = sequence;
-  std::array<std::byte, kCommandBytes> bytes{};
-  drivers::encode_command(command, bytes);
-  return bytes;
+  const hil::CommandPacket packet = hil::encode_command(command);
+  return {packet.bytes().begin(), packet.bytes().end()};
 }
 
 /// The sequence of the frame that the device sees next, and its first pixel.
@@ -140,14 +139,13 @@ TEST(MockLink, GarbageReachesTheReceiverAsRejectedAndTheNextCommandIsGood) {
   MockLink link(6, 4);
   auto damaged = command_bytes(1);
   damaged[20] ^= std::byte{4};
-  const std::vector<std::vector<std::byte>> garbage = {
-      {},
-      std::vector<std::byte>(1),
-      std::vector<std::byte>(95),
-      std::vector<std::byte>(96),
-      std::vector<std::byte>(97),
-      std::vector<std::byte>(256),
-      std::vector<std::byte>(damaged.begin(), damaged.end())};
+  const std::vector<std::vector<std::byte>> garbage = {{},
+                                                       std::vector<std::byte>(1),
+                                                       std::vector<std::byte>(71),
+                                                       std::vector<std::byte>(72),
+                                                       std::vector<std::byte>(73),
+                                                       std::vector<std::byte>(256),
+                                                       damaged};
   for (const auto& bytes : garbage) {
     ASSERT_TRUE(link.reply(bytes).ok());
     const auto got = link.receive(kAtOnce);

@@ -62,13 +62,14 @@ class Rig {
     s.attitude = {attitude(Duration{}), attitude(s.exposure / 2), attitude(s.exposure)};
     return s;
   }
-  FrameReport expose(const Shot& s, DnImage& out) { return chain_->expose(s, {}, out); }
+  FrameReport expose(const Shot& s, DnImage& out) { return chain_->expose(s, {}, out, mask_); }
 
   Flyby flyby;
 
  private:
   WorkerPool pool_;
   std::unique_ptr<ImagingChain> chain_;
+  TruthMask mask_{1024};
 };
 
 TEST(ImagingChain, AFrameHasTheSameBitsOnAnyNumberOfThreads) {

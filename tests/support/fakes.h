@@ -72,7 +72,7 @@ class PixelGenerator final : public engine::SceneGenerator {
       : while_exposing_(std::move(while_exposing)) {}
 
   engine::FrameReport expose(const engine::Shot& shot, engine::Budget /*budget*/,
-                             engine::DnImage& out) noexcept override {
+                             engine::DnImage& out, engine::TruthMask& /*mask*/) noexcept override {
     shots_.push_back(shot);
     const double seen = shot.attitude.middle.axes.matrix(0, 0);
     const auto words = std::bit_cast<std::array<std::uint16_t, 4>>(seen);

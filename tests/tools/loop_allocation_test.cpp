@@ -93,10 +93,9 @@ class Bench {
       command.answers_frame = view.value().frame.sequence;
       command.trim_offset_rad = {-5e-6, 0.0};
       command.reference = view.value().frame.shutter_open;
-      std::array<std::byte, drivers::kCommandBytes> packet{};
-      drivers::encode_command(command, packet);
+      const hil::CommandPacket packet = hil::encode_command(command);
       link.release_frame();
-      ENSURE(link.reply(packet).ok());
+      ENSURE(link.reply(packet.bytes()).ok());
     }
   }
 

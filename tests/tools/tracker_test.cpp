@@ -70,7 +70,7 @@ Command answer(Tracker& tracker, std::span<const std::byte> bytes) {
   const auto packet = tracker.on_frame(bytes);
   EXPECT_TRUE(packet.has_value());
   if (!packet) return {};
-  const auto command = drivers::decode_command(*packet);
+  const auto command = hil::decode_command(packet->bytes());
   EXPECT_TRUE(command.ok()) << "its own answer is no command";
   return command.ok() ? command.value() : Command{};
 }

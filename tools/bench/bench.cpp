@@ -72,13 +72,14 @@ void bench_frame(benchmark::State& state) {
                    pointing.attitude(shot.shutter_open + shot.exposure / 2),
                    pointing.attitude(shot.shutter_open + shot.exposure)};
   DnImage image(scenario.scene.camera.width_px, scenario.scene.camera.height_px);
+  TruthMask mask;
   FrameReport report;
   double render_s = 0;
   double optics_s = 0;
   double detector_s = 0;
   for (auto _ : state) {
     ++shot.sequence;
-    report = rig.chain().expose(shot, Budget{}, image);
+    report = rig.chain().expose(shot, Budget{}, image, mask);
     render_s += seconds(report.times.render);
     optics_s += seconds(report.times.optics);
     detector_s += seconds(report.times.detector);

@@ -54,8 +54,9 @@ int render_frame(const CommonOptions& options, const RenderOptions& render) {
   shot.attitude = {pointing.attitude(shot.shutter_open),
                    pointing.attitude(shot.shutter_open + shot.exposure / 2),
                    pointing.attitude(shot.shutter_open + shot.exposure)};
+  engine::TruthMask mask;
   engine::DnImage frame(scenario.scene.camera.width_px, scenario.scene.camera.height_px);
-  const engine::FrameReport report = rig.chain().expose(shot, engine::Budget{}, frame);
+  const engine::FrameReport report = rig.chain().expose(shot, engine::Budget{}, frame, mask);
 
   const std::filesystem::path fits(render.out);
   const std::string png = std::filesystem::path(fits).replace_extension(".png").string();

@@ -36,7 +36,7 @@ void run_tracker(drivers::MockLink& link, tracker::Tracker& tracker, const std::
     if (!bytes.ok()) continue;
     const auto answer = tracker.on_frame(bytes.value());
     link.release_frame();
-    if (answer) static_cast<void>(link.reply(*answer));
+    if (answer) static_cast<void>(link.reply(answer->bytes()));
   }
 }
 

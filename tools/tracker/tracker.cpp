@@ -22,7 +22,7 @@ cv::Mat as_image(const drivers::FrameView& view) {
 Tracker::Tracker(const TrackerSpec& spec, int width_px, int height_px)
     : spec_(spec), width_px_(width_px), height_px_(height_px), histogram_(65536) {}
 
-std::optional<Tracker::Packet> Tracker::on_frame(std::span<const std::byte> bytes) {
+std::optional<hil::CommandPacket> Tracker::on_frame(std::span<const std::byte> bytes) {
   const auto decoded = drivers::decode_frame(bytes);
   if (!decoded.ok() || decoded.value().width_px != width_px_ ||
       decoded.value().height_px != height_px_) {
@@ -41,9 +41,8 @@ std::optional<Tracker::Packet> Tracker::on_frame(std::span<const std::byte> byte
     command.trim_rate_rad_s = {axes_[0].rate_rad_s, axes_[1].rate_rad_s};
     command.reference = last_seen_;
   }
-  Packet packet;
-  drivers::encode_command(command, packet);
-  return packet;
+  command.made_at = view.frame.shutter_open + view.frame.exposure;
+  return hil::encode_command(command);
 }
 
 Tracker::Background Tracker::measure_background(const drivers::FrameView& view) {
@@ -109,7 +108,13 @@ hil::Detection Tracker::detect(const drivers::FrameView& view) {
     }
   }
   if (!(sum > 0.0)) return {};
-  return {{sum_u / sum, sum_v / sum}, 1.0F};
+  // The dilation has grown the box by four pixels each way.
+  const auto edge = [](int pixel, int grown) { return static_cast<float>(pixel + grown) - 0.5F; };
+  return {.centroid_px = {sum_u / sum, sum_v / sum},
+          .confidence = 1.0F,
+          .id = 1,
+          .box_px = {edge(box.x, 4), edge(box.y, 4), edge(box.x + box.width, -4),
+                     edge(box.y + box.height, -4)}};
 }
 
 void Tracker::filter(const drivers::FrameView& view, const hil::Detection& detection) noexcept {

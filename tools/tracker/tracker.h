@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "drivers/frame_packet.h"
+#include "hil/space_packet.h"
 
 namespace tracker {
 
@@ -27,9 +28,8 @@ class Tracker {
  public:
   Tracker(const TrackerSpec& spec, int width_px, int height_px);
 
-  using Packet = std::array<std::byte, drivers::kCommandBytes>;
   /// Nothing for bytes that are no frame of this camera: they are counted and left alone.
-  [[nodiscard]] std::optional<Packet> on_frame(std::span<const std::byte> bytes);
+  [[nodiscard]] std::optional<hil::CommandPacket> on_frame(std::span<const std::byte> bytes);
   [[nodiscard]] std::uint64_t bad_frames() const noexcept { return bad_frames_; }
 
  private:

@@ -1,10 +1,10 @@
-#include "drivers/crc32c.h"
+#include "engine/core/crc32c.h"
 
 #include <array>
 #include <bit>
 #include <cstring>
 
-namespace drivers {
+namespace engine {
 namespace {
 
 static_assert(std::endian::native == std::endian::little);
@@ -45,4 +45,4 @@ std::uint32_t crc32c(std::span<const std::byte> bytes) noexcept {
   return ~c;
 }
 
-}  // namespace drivers
+}  // namespace engine

@@ -1,4 +1,4 @@
-#include "drivers/crc32c.h"
+#include "engine/core/crc32c.h"
 
 #include <cstring>
 #include <random>
@@ -9,7 +9,7 @@
 
 namespace {
 
-using drivers::crc32c;
+using engine::crc32c;
 
 std::uint32_t crc_of(std::string_view text) {
   return crc32c(std::as_bytes(std::span(text.data(), text.size())));
