@@ -53,8 +53,8 @@ FrameReport ImagingChain::expose(const Shot& shot, Budget budget, DnImage& out,
   return report;
 }
 
-void ImagingChain::measure_light(const PixelRect& window, Duration exposure,
-                                 FrameTruth& truth, TruthMask& mask) const noexcept {
+void ImagingChain::measure_light(const PixelRect& window, Duration exposure, FrameTruth& truth,
+                                 TruthMask& mask) const noexcept {
   mask.clear();
   const double background = radiance_.uniform_w_m2_sr * optics_.throughput_sr();
   double sum = 0;
