@@ -1,5 +1,7 @@
 #pragma once
 
+#include <atomic>
+
 #include "engine/core/time.h"
 
 namespace hil {
@@ -19,19 +21,20 @@ class ManualClock final : public Clock {
  public:
   explicit ManualClock(engine::SimTime start) : now_(start) {}
 
-  [[nodiscard]] engine::SimTime now() const noexcept override { return now_; }
+  /// Thread: any; the rest is the loop's.
+  [[nodiscard]] engine::SimTime now() const noexcept override {
+    return now_.load(std::memory_order_relaxed);
+  }
   engine::Duration sleep_until(engine::SimTime t) noexcept override {
-    if (t > now_) {
-      now_ = t;
-      return engine::Duration{};
-    }
-    return now_ - t;
+    if (t <= now()) return now() - t;
+    now_.store(t, std::memory_order_relaxed);
+    return engine::Duration{};
   }
   /// Lets time pass without anybody having asked: a stage that takes long.
-  void pass(engine::Duration d) noexcept { now_ += d; }
+  void pass(engine::Duration d) noexcept { now_.store(now() + d, std::memory_order_relaxed); }
 
  private:
-  engine::SimTime now_;
+  std::atomic<engine::SimTime> now_;
 };
 
 }  // namespace hil

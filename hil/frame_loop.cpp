@@ -4,6 +4,7 @@
 #include <thread>
 #include <utility>
 
+#include "hil/realtime.h"
 #include "hil/steady_clock.h"
 
 namespace hil {
@@ -46,28 +47,7 @@ LoopReport FrameLoop::run(const std::stop_token& stop) {
   std::jthread receiver([this](const std::stop_token& s) { receive_commands(s); });
   for (std::uint64_t k = 0; k < spec_.frames && !stop.stop_requested(); ++k) {
     k = skip_missed(k, report);
-    if (k >= spec_.frames) break;
-    ++report.due;
-    obey(k, report);
-    FrameRecord record;
-    record.sequence = k;
-    record.shutter_open = opening(k);
-    record.skipped_before = std::exchange(skipped_before_, 0);
-    record.late = clock_.sleep_until(record.shutter_open);
-    if (record.late > kLateLimit) ++report.late;
-    std::size_t slot = 0;
-    record.handed_over = acquire_slot(stop, slot);
-    counts_ = {report.skipped, report.dropped, report.late, report.commands};
-    if (record.handed_over) {
-      expose(k, slot, record);
-    } else {
-      ++report.dropped;
-    }
-    if (!frames_.push(record)) ++report.records_lost;
-    if (record.handed_over && spec_.answer_timeout > Duration{} &&
-        !wait_for_answer(k, stop, report)) {
-      break;
-    }
+    if (k >= spec_.frames || !run_frame(k, stop, report)) break;
   }
   sender.request_stop();
   ready_count_.release();
@@ -81,6 +61,51 @@ LoopReport FrameLoop::run(const std::stop_token& stop) {
   report.command_faults = receiver_counts_.command_faults;
   report.commands_lost += receiver_counts_.commands_lost;
   return report;
+}
+
+bool FrameLoop::run_frame(std::uint64_t k, const std::stop_token& stop, LoopReport& report) {
+  if (spec_.trigger != nullptr && !wait_for_trigger(stop, report)) return false;
+  ++report.due;
+  const bool in_time = skipped_before_ == 0 && clock_.now() <= opening(k);
+  obey(k, report);
+  FrameRecord record;
+  record.sequence = k;
+  record.shutter_open = opening(k);
+  record.skipped_before = std::exchange(skipped_before_, 0);
+  wait_for_shutter(in_time, record, report);
+  std::size_t slot = 0;
+  record.handed_over = acquire_slot(stop, slot);
+  counts_ = {report.skipped, report.dropped, report.late, report.commands};
+  if (record.handed_over) {
+    expose(k, slot, record);
+  } else {
+    ++report.dropped;
+  }
+  if (!frames_.push(record)) ++report.records_lost;
+  return !record.handed_over || spec_.answer_timeout <= Duration{} ||
+         wait_for_answer(k, stop, report);
+}
+
+bool FrameLoop::wait_for_trigger(const std::stop_token& stop, LoopReport& report) noexcept {
+  if (spec_.trigger->wait(spec_.trigger_timeout, stop)) return true;
+  report.trigger_missing = !stop.stop_requested();
+  return false;
+}
+
+void FrameLoop::wait_for_shutter(bool in_time, FrameRecord& record, LoopReport& report) noexcept {
+  record.late = clock_.sleep_until(record.shutter_open);
+  const Duration woke = SteadyClock::stopwatch();
+  if (record.late > kLateLimit) ++report.late;
+  const Duration delay =
+      record.late + spec_.period * static_cast<std::int64_t>(record.skipped_before);
+  if (delay > kLateLimit) {
+    if (spec_.hiccups != nullptr)
+      for (Hiccup h; spec_.hiccups->next(h);) hiccups_.add(h);
+    // A loop that was at work lost its time anywhere since the frame before; one that slept, now.
+    const Duration from = in_time ? woke - delay : woke - delay - spec_.period;
+    record.late_cause = late_cause(delay, in_time, hiccups_.within(from, woke));
+  }
+  ++report.late_by_cause[static_cast<std::size_t>(record.late_cause)];
 }
 
 /// The first frame from `k` on whose shutter can still open on time.
@@ -170,12 +195,13 @@ bool FrameLoop::wait_for_answer(std::uint64_t k, const std::stop_token& stop,
     } else {
       ++report.commands_lost;
     }
-    if (command.answers_frame == k) return true;
+    if (command.answers_frame == k && !command.more_follow) return true;
   }
   return false;
 }
 
 void FrameLoop::send_frames(const std::stop_token& stop) noexcept {
+  if (spec_.service_priority > 0) static_cast<void>(raise_priority(spec_.service_priority));
   // The stop comes with one count more: the ring is empty then, and only then.
   for (;;) {
     ready_count_.acquire();
@@ -197,9 +223,12 @@ void FrameLoop::send_frames(const std::stop_token& stop) noexcept {
 }
 
 void FrameLoop::receive_commands(const std::stop_token& stop) noexcept {
+  if (spec_.service_priority > 0) static_cast<void>(raise_priority(spec_.service_priority));
   while (!stop.stop_requested()) {
     const engine::Expected<Command> command = source_.receive(kPatience);
-    if (command.ok()) {
+    if (command.ok() && command.value().kind == CommandKind::kTrigger) {
+      if (spec_.trigger != nullptr) spec_.trigger->pull();
+    } else if (command.ok()) {
       if (received_.push(command.value())) {
         received_count_.release();
       } else {

@@ -1,13 +1,16 @@
 #pragma once
 
+#include <array>
 #include <semaphore>
 #include <stop_token>
 #include <vector>
 
 #include "engine/scene_generator.h"
 #include "hil/clock.h"
+#include "hil/hiccup_meter.h"
 #include "hil/pointing_source.h"
 #include "hil/spsc_ring.h"
+#include "hil/trigger.h"
 
 namespace hil {
 
@@ -27,6 +30,11 @@ struct LoopSpec {
   /// Lockstep: the next frame waits this long for the answer to the last. Zero: it does not wait.
   engine::Duration answer_timeout{};
   engine::Duration send_timeout{50'000'000};
+  /// If given, each frame waits this long for a pull; without one the run ends.
+  Trigger* trigger = nullptr;
+  engine::Duration trigger_timeout{};
+  HiccupMeter* hiccups = nullptr;  ///< if given, says which delays are the machine's
+  int service_priority = 0;        ///< SCHED_FIFO of sender and receiver; 0: ordinary
   int width_px = 1024;
   int height_px = 1024;
   int bits = 11;
@@ -36,7 +44,8 @@ struct LoopSpec {
 struct FrameRecord {
   std::uint64_t sequence = 0;
   engine::SimTime shutter_open{};
-  engine::Duration late{};  ///< of the wake-up
+  engine::Duration late{};                  ///< of the wake-up
+  LateCause late_cause = LateCause::kNone;  ///< of a frame that is late or comes after skipped ones
   engine::Duration busy{};  ///< from the wake-up to the hand-over to the sender, by the clock
   engine::FrameReport report;
   TrimAngles trim_rad{};
@@ -56,15 +65,18 @@ struct CommandRecord {
 struct LoopReport {
   std::uint64_t due = 0;
   std::uint64_t sent = 0;
-  std::uint64_t skipped = 0;         ///< whole periods that passed while we were still at work
-  std::uint64_t dropped = 0;         ///< the link still held every slot
-  std::uint64_t faults = 0;          ///< the link refused, timed out or was gone
-  std::uint64_t late = 0;            ///< woken over a millisecond after the deadline
+  std::uint64_t skipped = 0;  ///< whole periods that passed while we were still at work
+  std::uint64_t dropped = 0;  ///< the link still held every slot
+  std::uint64_t faults = 0;   ///< the link refused, timed out or was gone
+  std::uint64_t late = 0;     ///< woken over a millisecond after the deadline
+  /// Frames that were late or came after skipped ones, by cause.
+  std::array<std::uint64_t, kLateCauses> late_by_cause{};
   std::uint64_t commands = 0;        ///< obeyed
   std::uint64_t command_faults = 0;  ///< packets that were none
   std::uint64_t commands_lost = 0;   ///< came faster than a slot could take them
   std::uint64_t records_lost = 0;    ///< the observer was too slow; the frame itself was not
   bool answer_missing = false;       ///< lockstep ended because no answer came
+  bool trigger_missing = false;      ///< the run ended because nobody pulled the trigger
   engine::Error last_fault{};
 };
 
@@ -98,6 +110,12 @@ class FrameLoop {
   [[nodiscard]] engine::SimTime opening(std::uint64_t k) const noexcept {
     return spec_.start + spec_.period * static_cast<std::int64_t>(k);
   }
+  /// Runs frame `k`; false: the run is over before its time.
+  [[nodiscard]] bool run_frame(std::uint64_t k, const std::stop_token& stop, LoopReport& report);
+  [[nodiscard]] bool wait_for_trigger(const std::stop_token& stop, LoopReport& report) noexcept;
+  /// Sleeps until the shutter opens, and finds out why it opens late when it does. `in_time`: the
+  /// work before was done.
+  void wait_for_shutter(bool in_time, FrameRecord& record, LoopReport& report) noexcept;
   [[nodiscard]] std::uint64_t skip_missed(std::uint64_t k, LoopReport& report) noexcept;
   [[nodiscard]] bool acquire_slot(const std::stop_token& stop, std::size_t& slot) noexcept;
   void obey(std::uint64_t k, LoopReport& report) noexcept;
@@ -127,6 +145,7 @@ class FrameLoop {
   std::vector<Command> waiting_;  // taken, not yet obeyed; the loop's own
   std::uint64_t skipped_before_ = 0;
   LoopCounts counts_;
+  HiccupHistory hiccups_;
   LoopReport sender_counts_;    // the sender's own until it is joined
   LoopReport receiver_counts_;  // the receiver's own until it is joined
   FrameRing frames_;            // loop -> observer

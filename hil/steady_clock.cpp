@@ -20,12 +20,15 @@ Duration SteadyClock::stopwatch() noexcept {
 SimTime SteadyClock::now() const noexcept { return start_ + (stopwatch() - started_at_); }
 
 Duration SteadyClock::sleep_until(SimTime t) noexcept {
-  const Duration wake = started_at_ + (t - start_);
+  sleep_until_stopwatch(started_at_ + (t - start_));
+  return std::max(Duration{}, now() - t);
+}
+
+void SteadyClock::sleep_until_stopwatch(Duration wake) noexcept {
   const auto whole = std::chrono::floor<std::chrono::seconds>(wake);
   const timespec deadline{whole.count(), (wake - whole).count()};
   while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &deadline, nullptr) == EINTR) {
   }
-  return std::max(Duration{}, now() - t);
 }
 
 }  // namespace hil

@@ -15,6 +15,7 @@ class SteadyClock final : public Clock {
 
   /// For measuring how long something took.
   [[nodiscard]] static engine::Duration stopwatch() noexcept;
+  static void sleep_until_stopwatch(engine::Duration t) noexcept;
 
  private:
   engine::SimTime start_;

@@ -1,0 +1,178 @@
+// Who says when a shutter opens, and whose fault it is when it opens late.
+
+#include <optional>
+#include <thread>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "hil/frame_loop.h"
+#include "tests/support/fakes.h"
+
+namespace {
+
+using engine::Duration;
+using engine::sim_time;
+using hil::Command;
+using hil::CommandKind;
+using hil::Frame;
+using hil::FrameLoop;
+using hil::FrameRecord;
+using hil::LateCause;
+using hil::LoopReport;
+using hil::LoopSpec;
+
+constexpr Duration kPeriod{100'000'000};
+constexpr Duration kMillisecond{1'000'000};
+const engine::SimTime kStart = sim_time(1000.0);
+
+LoopSpec patient_loop(std::uint64_t frames) {
+  LoopSpec spec;
+  spec.start = kStart;
+  spec.period = kPeriod;
+  spec.frames = frames;
+  spec.width_px = 8;
+  spec.height_px = 2;
+  spec.when_busy = hil::WhenBusy::kWait;
+  return spec;
+}
+
+/// A loop with everything around it faked.
+struct Rig {
+  hil::ManualClock clock{kStart - kPeriod};
+  fakes::IdealPointing pointing;
+  fakes::Sink sink;
+  fakes::SilentSource silent;
+};
+
+TEST(TriggeredLoop, MakesOneFrameForEachPullAndEndsWhenNobodyPullsAnyMore) {
+  Rig rig;
+  fakes::PixelGenerator generator;
+  hil::Trigger trigger;
+  LoopSpec spec = patient_loop(100);
+  spec.trigger = &trigger;
+  spec.trigger_timeout = kMillisecond;
+  for (int i = 0; i < 7; ++i) trigger.pull();
+  FrameLoop loop(spec, rig.clock, rig.pointing, generator, rig.sink, rig.silent);
+  const LoopReport report = loop.run({});
+  EXPECT_EQ(report.due, 7U);
+  EXPECT_EQ(report.sent, 7U);
+  EXPECT_TRUE(report.trigger_missing);
+  // Simulated time goes on by a period a frame, however long the pulls lie apart.
+  EXPECT_EQ(generator.shots().back().shutter_open, kStart + 6 * kPeriod);
+}
+
+TEST(TriggeredLoop, OpensNoShutterBeforeThePull) {
+  Rig rig;
+  hil::Trigger trigger;
+  std::atomic<int> pulled{0};
+  bool too_early = false;
+  std::uint64_t seen = 0;
+  fakes::PixelGenerator generator([&](const engine::Shot& shot) {
+    too_early = too_early || pulled.load() <= static_cast<int>(shot.sequence);
+    ++seen;
+  });
+  LoopSpec spec = patient_loop(20);
+  spec.trigger = &trigger;
+  spec.trigger_timeout = std::chrono::seconds(20);
+  FrameLoop loop(spec, rig.clock, rig.pointing, generator, rig.sink, rig.silent);
+  std::jthread puller([&] {
+    for (int i = 0; i < 20; ++i) {
+      std::this_thread::yield();
+      ++pulled;
+      trigger.pull();
+    }
+  });
+  const LoopReport report = loop.run({});
+  EXPECT_EQ(report.sent, 20U);
+  EXPECT_FALSE(report.trigger_missing);
+  EXPECT_FALSE(too_early);
+}
+
+TEST(TriggeredLoop, APacketPullsTheTriggerAndIsNothingToObey) {
+  Rig rig;
+  fakes::PixelGenerator generator;
+  hil::Trigger trigger;
+  // Each frame asks for the next.
+  fakes::Device device([](const Frame& frame) -> std::optional<Command> {
+    if (frame.sequence == 9) return std::nullopt;
+    Command command;
+    command.sequence = frame.sequence + 1;
+    command.kind = CommandKind::kTrigger;
+    return command;
+  });
+  trigger.pull();
+  LoopSpec spec = patient_loop(10);
+  spec.trigger = &trigger;
+  spec.trigger_timeout = std::chrono::seconds(20);
+  FrameLoop loop(spec, rig.clock, rig.pointing, generator, device, device);
+  const LoopReport report = loop.run({});
+  EXPECT_EQ(report.sent, 10U);
+  EXPECT_EQ(report.commands, 0U);
+}
+
+TEST(TriggeredLoop, AStopReachesALoopThatWaitsForAPull) {
+  Rig rig;
+  std::stop_source stop;
+  hil::Trigger trigger;
+  fakes::PixelGenerator generator([&stop](const engine::Shot&) { stop.request_stop(); });
+  LoopSpec spec = patient_loop(10);
+  spec.trigger = &trigger;
+  spec.trigger_timeout = std::chrono::hours(1);
+  trigger.pull();
+  trigger.pull();
+  FrameLoop loop(spec, rig.clock, rig.pointing, generator, rig.sink, rig.silent);
+  const LoopReport report = loop.run(stop.get_token());
+  EXPECT_EQ(report.due, 1U);
+  EXPECT_FALSE(report.trigger_missing);
+}
+
+TEST(Lockstep, AnAnswerInSeveralPacketsIsWholeWithTheLast) {
+  Rig rig;
+  fakes::PixelGenerator generator;
+  fakes::QueueSource source;
+  fakes::Sink sink([&source](const Frame& frame, Duration) -> engine::Status {
+    Command command;
+    command.answers_frame = frame.sequence;
+    for (const bool more : {true, true, false}) {
+      command.more_follow = more;
+      command.kind = more ? CommandKind::kReport : CommandKind::kTrim;
+      source.give(command);
+    }
+    return engine::Done{};
+  });
+  LoopSpec spec = patient_loop(5);
+  spec.answer_timeout = std::chrono::seconds(20);
+  FrameLoop loop(spec, rig.clock, rig.pointing, generator, sink, source);
+  const LoopReport report = loop.run({});
+  EXPECT_EQ(report.commands, 15U);
+  // All three are obeyed before the next frame: had the first ended the wait, some came later.
+  for (hil::CommandRecord r; loop.commands().pop(r);)
+    EXPECT_EQ(r.frame, r.command.answers_frame + 1);
+}
+
+TEST(LateFrames, AFrameThatTookTooLongIsOurOwnDoing) {
+  Rig rig;
+  fakes::PixelGenerator generator([&rig](const engine::Shot& shot) {
+    if (shot.sequence == 3) rig.clock.pass(kPeriod * 5 / 2);
+  });
+  FrameLoop loop(patient_loop(10), rig.clock, rig.pointing, generator, rig.sink, rig.silent);
+  const LoopReport report = loop.run({});
+  EXPECT_EQ(report.late_by_cause[static_cast<std::size_t>(LateCause::kOwnWork)], 1U);
+  for (FrameRecord r; loop.frames().pop(r);)
+    EXPECT_EQ(r.late_cause, r.skipped_before > 0 ? LateCause::kOwnWork : LateCause::kNone);
+}
+
+TEST(LateFrames, AWakeUpThatNothingExplainsIsUnknown) {
+  Rig rig;
+  fakes::HookedClock clock(kStart - kPeriod, {}, 2 * kMillisecond);
+  fakes::PixelGenerator generator;
+  LoopSpec spec = patient_loop(10);
+  spec.command_lead = Duration{};
+  FrameLoop loop(spec, clock, rig.pointing, generator, rig.sink, rig.silent);
+  const LoopReport report = loop.run({});
+  EXPECT_EQ(report.late, 10U);
+  EXPECT_EQ(report.late_by_cause[static_cast<std::size_t>(LateCause::kUnknown)], 10U);
+}
+
+}  // namespace
