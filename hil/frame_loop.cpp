@@ -95,12 +95,12 @@ bool FrameLoop::wait_for_trigger(const std::stop_token& stop, LoopReport& report
 void FrameLoop::wait_for_shutter(bool in_time, FrameRecord& record, LoopReport& report) noexcept {
   record.late = clock_.sleep_until(record.shutter_open);
   const Duration woke = SteadyClock::stopwatch();
+  if (spec_.hiccups != nullptr)
+    for (Hiccup h; spec_.hiccups->next(h);) hiccups_.add(h);
   if (record.late > kLateLimit) ++report.late;
   const Duration delay =
       record.late + spec_.period * static_cast<std::int64_t>(record.skipped_before);
   if (delay > kLateLimit) {
-    if (spec_.hiccups != nullptr)
-      for (Hiccup h; spec_.hiccups->next(h);) hiccups_.add(h);
     // A loop that was at work lost its time anywhere since the frame before; one that slept, now.
     const Duration from = in_time ? woke - delay : woke - delay - spec_.period;
     record.late_cause = late_cause(delay, in_time, hiccups_.within(from, woke));

@@ -11,7 +11,7 @@
 #include "drivers/mock_link.h"
 #include "engine/core/constants.h"
 #include "engine/orbit/utc.h"
-#include "hil/steady_clock.h"
+#include "tools/starloop/pacing.h"
 #include "tools/starloop/run_folder.h"
 #include "tools/starloop/subcommands.h"
 
@@ -23,8 +23,6 @@ using engine::Duration;
 using engine::seconds;
 
 constexpr Duration kPatience{20'000'000};
-// Set-up to first shutter: time for the threads to stand ready.
-constexpr Duration kRunUp{300'000'000};
 
 volatile std::sig_atomic_t interrupted = 0;
 void on_signal(int /*signal*/) { interrupted = 1; }
@@ -111,31 +109,24 @@ engine::Pass choose_pass(const Scenario& scenario) {
   return passes[scenario.run.pass - 1];
 }
 
-hil::LoopSpec loop_spec(const Scenario& scenario, const engine::Pass& pass) {
-  hil::LoopSpec spec;
-  spec.start = pass.start;
-  spec.period = scenario.run.period;
-  Duration lasts = pass.end - pass.start;
-  if (scenario.run.duration_s > 0.0)
-    lasts = std::min(lasts, engine::from_seconds(scenario.run.duration_s));
-  spec.frames = static_cast<std::uint64_t>(lasts / spec.period) + 1;
-  spec.exposure = scenario.run.exposure;
-  spec.command_lead = scenario.run.command_lead;
-  if (scenario.run.clock == ClockMode::kLockstep) {
-    spec.when_busy = hil::WhenBusy::kWait;
-    spec.answer_timeout = scenario.run.answer_timeout;
-    spec.send_timeout = scenario.run.answer_timeout;
-  }
-  spec.width_px = scenario.scene.camera.width_px;
-  spec.height_px = scenario.scene.camera.height_px;
-  spec.bits = scenario.detector.bits;
-  return spec;
+Duration length_of(const Scenario& scenario, const engine::Pass& pass) {
+  const Duration whole = pass.end - pass.start;
+  if (scenario.run.duration_s <= 0.0) return whole;
+  return std::min(whole, engine::from_seconds(scenario.run.duration_s));
 }
 
-std::unique_ptr<hil::Clock> make_clock(const Scenario& scenario, engine::SimTime start) {
-  if (scenario.run.clock == ClockMode::kLockstep)
-    return std::make_unique<hil::ManualClock>(start - scenario.run.period);
-  return std::make_unique<hil::SteadyClock>(start - kRunUp);
+const char* name_of(ClockMode mode) {
+  switch (mode) {
+    case ClockMode::kRealtime:
+      return "realtime";
+    case ClockMode::kLockstep:
+      return "lockstep";
+    case ClockMode::kAsFastAsPossible:
+      return "as-fast-as-possible";
+    case ClockMode::kTriggered:
+      return "triggered";
+  }
+  return "";
 }
 
 struct Verdict {
@@ -154,6 +145,19 @@ Verdict judge(const Scenario& scenario, const RunLog& log, bool open_loop) {
   return v;
 }
 
+nlohmann::ordered_json json_of(const hil::WakeHistogram& wakes) {
+  const auto us = [](Duration d) { return seconds(d) * 1e6; };
+  return {{"wakes", wakes.count()},
+          {"p50_us", us(wakes.quantile(0.5))},
+          {"p99_us", us(wakes.quantile(0.99))},
+          {"p99.9_us", us(wakes.quantile(0.999))},
+          {"max_us", us(wakes.worst())}};
+}
+
+std::uint64_t of_cause(const hil::LoopReport& report, hil::LateCause cause) {
+  return report.late_by_cause[static_cast<std::size_t>(cause)];
+}
+
 void write_report(const fs::path& folder, const Scenario& s, const engine::Pass& pass,
                   const RunLog& log, const Verdict& v, const PngRecorder& recorder, bool open_loop,
                   int threads) {
@@ -163,7 +167,7 @@ void write_report(const fs::path& folder, const Scenario& s, const engine::Pass&
       {"open_loop", open_loop},
       {"seed", s.scene.seed},
       {"threads", threads},
-      {"clock", s.run.clock == ClockMode::kLockstep ? "lockstep" : "realtime"},
+      {"clock", name_of(s.run.clock)},
       {"pass",
        {{"number", s.run.pass},
         {"start_s", seconds(pass.start)},
@@ -177,6 +181,10 @@ void write_report(const fs::path& folder, const Scenario& s, const engine::Pass&
         {"dropped", l.dropped},
         {"faults", l.faults},
         {"late", l.late},
+        {"late_or_after_skipped_by_cause",
+         {{"own_work", of_cause(l, hil::LateCause::kOwnWork)},
+          {"machine", of_cause(l, hil::LateCause::kMachine)},
+          {"unknown", of_cause(l, hil::LateCause::kUnknown)}}},
         {"records_lost", l.records_lost}}},
       {"commands",
        {{"taken", l.commands}, {"refused", l.command_faults}, {"lost", l.commands_lost}}},
@@ -187,6 +195,8 @@ void write_report(const fs::path& folder, const Scenario& s, const engine::Pass&
       {"pictures", {{"written", recorder.written()}, {"left_out", recorder.left_out()}}},
       {"answer_missing", l.answer_missing},
       {"command_latency_frames", 1},
+      {"realtime", log.realtime},
+      {"machine_hiccups", log.machine ? json_of(*log.machine) : nlohmann::ordered_json(nullptr)},
       {"pointing",
        {{"after_s", s.criteria.after_s},
         {"rms_px", v.held.rms_px},
@@ -207,13 +217,25 @@ void print_summary(const RunLog& log, const Verdict& v, const Scenario& s, bool 
   const hil::LoopReport& l = log.loop;
   spdlog::info("frames: {} due = {} sent + {} skipped + {} dropped + {} faults; {} late", l.due,
                l.sent, l.skipped, l.dropped, l.faults, l.late);
+  const auto delayed = l.due - l.skipped - of_cause(l, hil::LateCause::kNone);
+  if (delayed > 0)
+    spdlog::info(
+        "{} frames late or after skipped ones: {} our own work, {} the machine, {} unknown",
+        delayed, of_cause(l, hil::LateCause::kOwnWork), of_cause(l, hil::LateCause::kMachine),
+        of_cause(l, hil::LateCause::kUnknown));
+  if (log.machine)
+    spdlog::info("the machine's own stalls: p99.9 {:.2f} ms, worst {:.2f} ms",
+                 seconds(log.machine->quantile(0.999)) * 1e3, seconds(log.machine->worst()) * 1e3);
   spdlog::info("commands: {} taken, {} refused, {} lost", l.commands, l.command_faults,
                l.commands_lost);
   if (v.whole.lost_after_s)
     spdlog::info("the target's centre leaves the frame after {:.1f} s", *v.whole.lost_after_s);
   if (v.whole.without_target > 0)
     spdlog::info("{} frames without any of the target's light", v.whole.without_target);
-  if (!open_loop) {
+  if (!open_loop && v.held.frames == 0) {
+    spdlog::info("no frame shows the target from {:g} s on: the pointing is not judged good",
+                 s.criteria.after_s);
+  } else if (!open_loop) {
     spdlog::info(
         "pointing error from {:g} s on: {:.3f} px rms, {:.2f} px at worst ({}, limit {:g})",
         s.criteria.after_s, v.held.rms_px, v.held.worst_px, v.good ? "good" : "NOT GOOD ENOUGH",
@@ -228,7 +250,8 @@ int run_pass(const CommonOptions& options, const RunOptions& run) {
   if (options.quiet) spdlog::set_level(spdlog::level::warn);
   const Scenario scenario = load_scenario(options);
   const engine::Pass pass = choose_pass(scenario);
-  const hil::LoopSpec spec = loop_spec(scenario, pass);
+  Pacing pacing(scenario, pass.start, length_of(scenario, pass));
+  const hil::LoopSpec& spec = pacing.loop_spec();
   Rig rig(scenario, options.threads);
   const fs::path folder = make_run_folder(run.out, scenario.name);
   spdlog::info(
@@ -249,18 +272,24 @@ int run_pass(const CommonOptions& options, const RunOptions& run) {
   hil::GuidanceError guidance = scenario.guidance;
   guidance.start = spec.start;
   hil::ClosedLoopPointing pointing(rig.prediction(), guidance, scenario.actuator);
-  const std::unique_ptr<hil::Clock> clock = make_clock(scenario, spec.start);
-  hil::FrameLoop loop(spec, *clock, pointing, rig.chain(), sinks, link);
-
-  Observer observer(scenario, loop, spec.frames, options.quiet);
   std::signal(SIGINT, on_signal);
   std::signal(SIGTERM, on_signal);
+  if (!pacing.wait_for_reader(sinks, [] { return interrupted != 0; })) {
+    spdlog::error("nobody reads the frames after {:g} s", seconds(scenario.run.start_timeout));
+    return kDeviceFault;
+  }
+  pacing.start();
+  hil::FrameLoop loop(spec, pacing.clock(), pointing, rig.chain(), sinks, link);
+  Observer observer(scenario, loop, spec.frames, options.quiet);
   {
     std::stop_source loop_stop;
     std::jthread device([&](const std::stop_token& stop) { run_tracker(link, tracker, stop); });
     std::jthread watcher([&](const std::stop_token& stop) { observer.watch(stop, loop_stop); });
+    observer.log().realtime = pacing.enter_realtime();
+    if (!observer.log().realtime.empty()) spdlog::info("real time: {}", observer.log().realtime);
     observer.log().loop = loop.run(loop_stop.get_token());
   }
+  if (const hil::WakeHistogram* wakes = pacing.finish()) observer.log().machine = *wakes;
   recorder.finish();
 
   const RunLog& log = observer.log();
@@ -272,6 +301,10 @@ int run_pass(const CommonOptions& options, const RunOptions& run) {
     spdlog::warn(
         "no contact sheet and no plot: /usr/bin/python3 with matplotlib did not draw them");
   spdlog::info("results: {}", folder.string());
+  if (log.loop.trigger_missing) {
+    spdlog::error("nobody pulled the trigger within {:g} s", seconds(scenario.run.trigger_timeout));
+    return kDeviceFault;
+  }
   if (log.loop.answer_missing) {
     spdlog::error("the software under test gave no answer within {:g} s",
                   seconds(scenario.run.answer_timeout));

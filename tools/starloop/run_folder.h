@@ -57,6 +57,8 @@ struct RunLog {
   std::vector<hil::FrameRecord> frames;
   std::vector<hil::CommandRecord> commands;
   hil::LoopReport loop;
+  std::string realtime;                       ///< what the system granted
+  std::optional<hil::WakeHistogram> machine;  ///< its own stalls; in real time only
 };
 
 /// How well the camera pointed, from `after` on: over the frames that show the target.

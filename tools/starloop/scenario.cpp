@@ -40,9 +40,17 @@ RunSpec read_run(const ConfigTable& table) {
       from_seconds(table.number_or("command_lead_ms", 20.0, engine::between(0.0, 1e5)) * 1e-3);
   run.answer_timeout =
       from_seconds(table.number_or("answer_timeout_s", 10.0, engine::between(0.1, 3600.0)));
-  run.clock = table.choice_or<ClockMode>(
-      "clock", "realtime",
-      {{"realtime", ClockMode::kRealtime}, {"lockstep", ClockMode::kLockstep}});
+  run.clock = table.choice_or<ClockMode>("clock", "realtime",
+                                         {{"realtime", ClockMode::kRealtime},
+                                          {"lockstep", ClockMode::kLockstep},
+                                          {"as-fast-as-possible", ClockMode::kAsFastAsPossible},
+                                          {"triggered", ClockMode::kTriggered}});
+  run.trigger = table.text_or("trigger", "packet");
+  run.trigger_where = table.where("trigger");
+  run.trigger_timeout =
+      from_seconds(table.number_or("trigger_timeout_s", 60.0, engine::between(0.1, 1e6)));
+  run.start_timeout =
+      from_seconds(table.number_or("start_timeout_s", 30.0, engine::between(0.0, 1e6)));
   run.record_every =
       static_cast<std::uint64_t>(table.integer_or("record_every", 10, engine::at_least(1.0)));
   if (run.exposure + run.command_lead > run.period) {
@@ -128,6 +136,7 @@ Scenario read_scenario(const ConfigReader& config) {
                                          {{"celestial", hil::RollRule::kCelestial},
                                           {"vertical", hil::RollRule::kVertical}});
   s.actuator = hil::read_actuator(config.table("actuator"));
+  s.realtime = hil::read_realtime(config.table("realtime"));
   s.tracker = read_tracker(config.table("tracker"), s.scene.camera);
   config.reject_unknown_keys();
   return s;

@@ -11,11 +11,17 @@
 #include "engine/scene/brdf.h"
 #include "hil/closed_loop_pointing.h"
 #include "hil/frame_loop.h"
+#include "hil/realtime.h"
 #include "tools/tracker/tracker.h"
 
 namespace starloop {
 
-enum class ClockMode : std::uint8_t { kRealtime, kLockstep };
+enum class ClockMode : std::uint8_t {
+  kRealtime,          ///< absolute deadlines on the monotonic clock
+  kLockstep,          ///< each frame waits for the answer to the last
+  kAsFastAsPossible,  ///< each frame waits for the link alone
+  kTriggered,         ///< each frame waits for a pull from outside
+};
 
 /// How a run goes: when, how fast, what is kept.
 struct RunSpec {
@@ -27,6 +33,10 @@ struct RunSpec {
   engine::Duration command_lead{};
   engine::Duration answer_timeout{};
   ClockMode clock = ClockMode::kRealtime;
+  std::string trigger;        ///< "packet", "stdin", or the path of a pipe: a line is a pull
+  std::string trigger_where;  ///< the place in the scenario that says so
+  engine::Duration trigger_timeout{};
+  engine::Duration start_timeout{};  ///< how long the start waits for the software under test
   std::uint64_t record_every = 10;
 };
 
@@ -54,6 +64,7 @@ struct Scenario {
   hil::GuidanceError guidance;
   hil::RollRule roll = hil::RollRule::kCelestial;
   hil::ActuatorSpec actuator;
+  hil::RealtimeSpec realtime;
   tracker::TrackerSpec tracker;
 };
 
