@@ -10,6 +10,7 @@
 #include "engine/render/path_tracer.h"
 #include "engine/scene/brdf.h"
 #include "hil/closed_loop_pointing.h"
+#include "hil/faults/fault_spec.h"
 #include "hil/frame_loop.h"
 #include "tools/tracker/tracker.h"
 
@@ -54,6 +55,7 @@ struct Scenario {
   hil::GuidanceError guidance;
   hil::RollRule roll = hil::RollRule::kCelestial;
   hil::ActuatorSpec actuator;
+  hil::FaultSpec faults;
   tracker::TrackerSpec tracker;
 };
 
