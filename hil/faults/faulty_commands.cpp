@@ -31,7 +31,9 @@ Expected<Command> FaultyCommands::receive(Duration timeout) noexcept {
   const Expected<Command> got = inner_.receive(looks ? std::min(timeout, kLook) : timeout);
   if (!got.ok()) return got;
   read_news();
-  if (!take(got.value())) return Error{engine::Fault::kRejected, 0, "faults: corrupted"};
+  const bool sound = take(got.value());
+  note_answer(got.value());
+  if (!sound) return Error{engine::Fault::kRejected, 0, "faults: corrupted"};
   if (ready_.pop(next)) return next;
   return Error{engine::Fault::kTimeout, 0, "faults: lost or delayed"};
 }
@@ -40,8 +42,21 @@ void FaultyCommands::read_news() noexcept {
   FrameNews news;
   for (int n = 0; n < kMostNews && news_.pop(news); ++n) {
     at_ = news.at;
-    if (news.withheld) stand_in_for(news.at.frame);
+    if (!news.withheld) continue;
+    if (news.after == FrameNews::kNothing || news.after == last_answered_) {
+      stand_in_for(news.at.frame);
+    } else {
+      waits_ = news;
+    }
   }
+}
+
+void FaultyCommands::note_answer(const Command& command) noexcept {
+  if (command.answers_frame == kAnswersNone || command.more_follow) return;
+  last_answered_ = command.answers_frame;
+  if (!waits_.withheld || waits_.after != last_answered_) return;
+  waits_.withheld = false;
+  stand_in_for(waits_.at.frame);
 }
 
 bool FaultyCommands::take(const Command& command) noexcept {

@@ -29,7 +29,8 @@ struct CommandFaultCounts {
 ///
 /// In lockstep the loop waits for an answer to each frame. Where a fault keeps it away (the frame
 /// never went out, or its answer is lost, refused or delayed) the loop is given an empty report in
-/// its place, of a sender kStandIn of its own, and goes on.
+/// its place, of a sender kStandIn of its own, and goes on; after the answer to a late frame that
+/// went out instead. The software must answer every frame it gets, be it late; copies it need not.
 ///
 /// Thread: receiver, but for the ring. Loop-safe.
 class FaultyCommands final : public CommandSource {
@@ -58,6 +59,8 @@ class FaultyCommands final : public CommandSource {
   };
 
   void read_news() noexcept;
+  /// The last of an answer is in: what waited for it goes on.
+  void note_answer(const Command& command) noexcept;
   void release_delayed() noexcept;
   /// The fault that happens to the command in hand; faults.size() when there is none.
   [[nodiscard]] std::size_t choose() const noexcept;
@@ -75,6 +78,8 @@ class FaultyCommands final : public CommandSource {
   FrameNewsRing& news_;
   Pace pace_;
   FaultMoment at_;
+  std::uint64_t last_answered_ = FrameNews::kNothing;
+  FrameNews waits_;           // withheld: its stand-in waits
   std::uint64_t number_ = 0;  // of the command in hand
   std::array<Held, kMostCommandsDelayed> held_;
   SpscRing<Command, kMostReady> ready_;  // within one thread: a queue

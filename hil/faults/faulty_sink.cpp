@@ -22,17 +22,17 @@ FaultySink::FaultySink(const FaultSpec& spec, Shape shape, engine::SimTime start
       bloom_(shape.width_px),
       happened_(spec.faults.size()) {
   std::size_t late = 0;
-  bool copies = false;
+  std::size_t copies = 0;
   for (const PlannedFault& fault : spec_.faults) {
     if (fault.kind == FaultKind::kTorn || fault.kind == FaultKind::kFrozen) remembers_ = true;
     if (fault.kind >= FaultKind::kRays && fault.kind <= FaultKind::kFlipped)
       changed_.resize(shape.width_px, shape.height_px);
-    if (fault.kind == FaultKind::kDuplicated) copies = true;
+    if (fault.kind == FaultKind::kDuplicated) copies = 1;
     if (fault.kind == FaultKind::kLate)
       late = std::max(late, static_cast<std::size_t>(fault.frames));
   }
   if (remembers_) before_.resize(shape.width_px, shape.height_px);
-  held_.resize(late + (copies ? std::max<std::size_t>(late, 1) : 0));
+  held_.resize(late + copies);
   for (Held& held : held_) {
     held.pixels.resize(shape.width_px, shape.height_px);
     held.telemetry_row.reserve(static_cast<std::size_t>(shape.width_px));
@@ -71,16 +71,21 @@ Status FaultySink::send(const Frame& frame, Duration timeout) noexcept {
   ++counts_.taken;
   at_ = {frame.sequence, frame.shutter_open - start_};
   const Route route = choose_route();
-  // Before the frame itself: its answer must not overtake the news of it.
-  static_cast<void>(news_.push({at_, route.away || route.dropped || route.late_by > 0}));
+  // Before any frame: no answer must overtake the news.
+  static_cast<void>(news_.push({at_, false, FrameNews::kNothing}));
+  std::uint64_t instead = FrameNews::kNothing;
+  Duration share = timeout;
+  if (!route.away) {
+    const auto due = std::count_if(held_.begin(), held_.end(),
+                                   [&](const Held& held) { return is_due(held, route); });
+    share = timeout / (due + 1);
+    instead = send_held(route, share);
+  }
+  if (route.withheld()) static_cast<void>(news_.push({at_, true, instead}));
   if (route.away) {
     ++counts_.away;
     return Error{engine::Fault::kDisconnected, 0, "faults: away"};
   }
-  const auto due =
-      std::count_if(held_.begin(), held_.end(), [this](const Held& held) { return is_due(held); });
-  const Duration share = timeout / (due + 1);
-  send_held(share);
   if (route.dropped) {
     ++counts_.dropped;
     return Done{};
@@ -89,38 +94,36 @@ Status FaultySink::send(const Frame& frame, Duration timeout) noexcept {
   Frame out = frame;
   out.pixels = pixels_;
   out.shutter_open += clock_error();
-  return send_touched(out, route.late_by, share);
+  return send_along(out, route, share);
 }
 
 FaultySink::Route FaultySink::choose_route() noexcept {
   Route route;
   bool chosen = false;
-  each(FaultKind::kAway, FaultKind::kLate, [&](std::size_t i, Draws&) {
+  const auto choose = [&](std::size_t i, Draws&) {
     if (std::exchange(chosen, true)) return;
     const PlannedFault& fault = spec_.faults[i];
     route.away = fault.kind == FaultKind::kAway;
     route.dropped = fault.kind == FaultKind::kDropped;
+    route.twice = fault.kind == FaultKind::kDuplicated;
     if (fault.kind == FaultKind::kLate) route.late_by = static_cast<std::uint64_t>(fault.frames);
     record(i, 0, static_cast<std::int64_t>(route.late_by), 0);
-  });
+  };
+  each(FaultKind::kAway, FaultKind::kLate, choose);
+  each(FaultKind::kDuplicated, FaultKind::kDuplicated, choose);
   return route;
 }
 
-Status FaultySink::send_touched(const Frame& frame, std::uint64_t late_by,
-                                Duration timeout) noexcept {
-  bool again = false;
-  each(FaultKind::kDuplicated, FaultKind::kDuplicated, [&](std::size_t i, Draws&) {
-    if (std::exchange(again, true)) return;
-    record(i, 0, 0, 0);
+Status FaultySink::send_along(const Frame& frame, const Route& route, Duration timeout) noexcept {
+  if (route.late_by > 0) {
+    ++counts_.held;
+    hold(frame, at_.frame + route.late_by, false);
+    return Done{};
+  }
+  if (route.twice) {
     ++counts_.copies;
     ++counts_.copies_held;
-    // A late one comes twice just as late.
-    hold(frame, at_.frame + std::max<std::uint64_t>(late_by, 1), true);
-  });
-  if (late_by > 0) {
-    ++counts_.held;
-    hold(frame, at_.frame + late_by, false);
-    return Done{};
+    hold(frame, at_.frame + 1, true);
   }
   const Status status = pass_on(frame, timeout);
   ++(status.ok() ? counts_.delivered : counts_.refused);
@@ -159,16 +162,22 @@ void FaultySink::hold(const Frame& frame, std::uint64_t due, bool is_copy) noexc
   free->used = true;
 }
 
-/// In the order of their numbers; of a frame and its copy the frame comes first.
-void FaultySink::send_held(Duration share) noexcept {
+bool FaultySink::is_due(const Held& held, const Route& route) const noexcept {
+  // A copy waits for company, so that there is only ever one; and in lockstep software may leave
+  // copies unanswered, but not the frame behind it.
+  return held.used && held.due <= at_.frame && !(held.is_copy && route.withheld());
+}
+
+/// In the order of their numbers.
+std::uint64_t FaultySink::send_held(const Route& route, Duration share) noexcept {
+  std::uint64_t last = FrameNews::kNothing;
   for (;;) {
     Held* next = nullptr;
     for (Held& held : held_) {
-      if (!is_due(held)) continue;
-      const auto key = [](const Held& h) { return std::pair(h.frame.sequence, h.is_copy); };
-      if (next == nullptr || key(held) < key(*next)) next = &held;
+      if (!is_due(held, route)) continue;
+      if (next == nullptr || held.frame.sequence < next->frame.sequence) next = &held;
     }
-    if (next == nullptr) return;
+    if (next == nullptr) return last;
     const bool ok = inner_.send(next->frame, share).ok();
     next->used = false;
     if (next->is_copy) {
@@ -177,6 +186,7 @@ void FaultySink::send_held(Duration share) noexcept {
     } else {
       --counts_.held;
       ++(ok ? counts_.delivered : counts_.refused);
+      if (ok) last = next->frame.sequence;
     }
   }
 }

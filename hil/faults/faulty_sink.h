@@ -11,10 +11,14 @@
 
 namespace hil {
 
-/// What the faults of commands know of the frames: which came last, and whether it went out.
+/// What the faults of commands know of the frames. Before a frame goes out, its moment; of one that
+/// does not, once more, what its stand-in has to wait for.
 struct FrameNews {
+  static constexpr std::uint64_t kNothing = std::numeric_limits<std::uint64_t>::max();
+
   FaultMoment at;
-  bool withheld = false;  ///< nobody can answer it now
+  bool withheld = false;           ///< nobody can answer it now
+  std::uint64_t after = kNothing;  ///< the late frame that went out instead, whose answer is due
 };
 using FrameNewsRing = SpscRing<FrameNews, 1024>;
 
@@ -40,9 +44,9 @@ struct FrameFaultCounts {
 /// camera's, not the cable's. The loop's own slot is never written: what changes does so in a copy,
 /// and a frame that no fault touches goes on as it is, in the loop's own memory. The telemetry row
 /// and the truth mask go on unchanged; a frame that is held back or sent again has lost its mask.
-/// One of away, dropped and late happens to a frame, in this order; to one that is away or dropped
-/// nothing else does. "The frame before" of torn and frozen is the last that got further than that;
-/// the first of all is neither. To a frozen picture nothing else happens but wrong bits.
+/// One of away, dropped, late and duplicated happens to a frame, in this order; to one that is away
+/// or dropped nothing else does. "The frame before" of torn and frozen is the last that got further
+/// than that; the first of all is neither. To a frozen picture nothing else happens but wrong bits.
 /// To the loop a dropped or late frame is sent, and one for a link that is away a fault. What is
 /// held when the run ends is never sent.
 ///
@@ -82,14 +86,18 @@ class FaultySink final : public FrameSink {
   struct Route {
     bool away = false;
     bool dropped = false;
+    bool twice = false;
     std::uint64_t late_by = 0;
+
+    [[nodiscard]] bool withheld() const noexcept { return away || dropped || late_by > 0; }
   };
   /// Calls act(fault, draws) for each fault of these kinds that happens to the frame in hand.
   template <class Act>
   void each(FaultKind first, FaultKind last, Act&& act) noexcept;
   [[nodiscard]] Route choose_route() noexcept;
-  [[nodiscard]] engine::Status send_touched(const Frame& frame, std::uint64_t late_by,
-                                            engine::Duration timeout) noexcept;
+  /// Pre: neither away nor dropped.
+  [[nodiscard]] engine::Status send_along(const Frame& frame, const Route& route,
+                                          engine::Duration timeout) noexcept;
 
   void damage(const Frame& frame) noexcept;
   void damage_detector(std::size_t fault, engine::Draws& draws, int bits) noexcept;
@@ -99,10 +107,9 @@ class FaultySink final : public FrameSink {
   [[nodiscard]] engine::Duration clock_error() noexcept;
 
   void hold(const Frame& frame, std::uint64_t due, bool is_copy) noexcept;
-  void send_held(engine::Duration share) noexcept;
-  [[nodiscard]] bool is_due(const Held& held) const noexcept {
-    return held.used && held.due <= at_.frame;
-  }
+  [[nodiscard]] bool is_due(const Held& held, const Route& route) const noexcept;
+  /// Returns the last late frame that went out, or FrameNews::kNothing.
+  std::uint64_t send_held(const Route& route, engine::Duration share) noexcept;
   [[nodiscard]] engine::Status pass_on(const Frame& frame, engine::Duration timeout) noexcept;
   void record(std::size_t fault, std::int64_t place, std::int64_t count, double amount) noexcept;
 
