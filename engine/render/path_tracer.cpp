@@ -35,7 +35,7 @@ std::vector<Brdf> in_mesh_order(const Mesh& mesh, const std::vector<Material>& m
     const auto it = std::find_if(materials.begin(), materials.end(),
                                  [&](const Material& m) { return m.name == name; });
     if (it == materials.end()) throw ConfigError(material_missing(name));
-    brdfs.push_back(it->brdf);
+    brdfs.push_back(it->brdf());
   }
   return brdfs;
 }

@@ -232,7 +232,7 @@ std::vector<Material> read_materials(const ConfigReader& config) {
     p.br = p.kb > 0.0 ? table.number("br", from_below(-1e6, 0.0)) : p.br;
     p.kr = p.kb > 0.0 ? table.number("kr", positive()) : p.kr;
     const double wrinkle_deg = table.number_or("wrinkle_deg", 0.0, between(0.0, 30.0));
-    materials.push_back({name, Brdf(p, variant, wrinkle_deg * kDegree)});
+    materials.push_back({name, p, variant, wrinkle_deg * kDegree});
   }
   return materials;
 }

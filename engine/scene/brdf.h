@@ -86,9 +86,15 @@ class Brdf {
   std::array<float, kAngles> specular_albedo_{};    ///< by the cosine: cell centres
 };
 
+/// A surface by its parameters. The tables of its Brdf take a tenth of a second to make, so they
+/// are made when a scene is built, not when a scenario is read.
 struct Material {
   std::string name;
-  Brdf brdf;
+  FiveParameters parameters;
+  Brdf::Variant variant = Brdf::Variant::kPhysical;
+  double wrinkle_rad = 0;
+
+  [[nodiscard]] Brdf brdf() const { return {parameters, variant, wrinkle_rad}; }
 };
 /// Reads materials.<name> for each name below `materials`.
 [[nodiscard]] std::vector<Material> read_materials(const ConfigReader& config);

@@ -54,13 +54,10 @@ inline constexpr double kClosestOfPass3_s = 309781.705969;
   return {1.0, -1.0, 0.0, albedo / engine::kPi, 1.0};
 }
 [[nodiscard]] inline engine::Material lambert_material(const std::string& name, double albedo) {
-  return {name, engine::Brdf(lambert(albedo), engine::Brdf::Variant::kPhysical)};
+  return {name, lambert(albedo)};
 }
 [[nodiscard]] inline std::vector<engine::Material> telescope_materials() {
-  using engine::Brdf;
-  return {{"silicon", Brdf(silicon(), Brdf::Variant::kPhysical)},
-          {"polyimide", Brdf(polyimide(), Brdf::Variant::kPhysical)},
-          {"black", Brdf(lambert(0.03), Brdf::Variant::kPhysical)}};
+  return {{"silicon", silicon()}, {"polyimide", polyimide()}, {"black", lambert(0.03)}};
 }
 
 /// A camera of few pixels with the paper's optics.

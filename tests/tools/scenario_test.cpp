@@ -135,7 +135,8 @@ const std::vector<BadValue> kBadValues = {
     {"run.duration_s=-1", "run.duration_s", "got -1"},
     {"run.record_every=0", "run.record_every", "got 0"},
     {"run.clock=sundial", "run.clock",
-     "must be one of \"realtime\", \"lockstep\", got \"sundial\""},
+     "must be one of \"realtime\", \"lockstep\", \"as-fast-as-possible\", \"triggered\", "
+     "got \"sundial\""},
     {"run.exposure_ms=90.001", "run.exposure_ms", "must fit into one period"},
     {"scenario.epoch=yesterday", "scenario.epoch", "must be a UTC date"},
     {"scenario.epoch=2022-13-01T00:00:00", "scenario.epoch", "must be a UTC date"},

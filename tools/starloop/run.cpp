@@ -11,6 +11,8 @@
 #include "drivers/mock_link.h"
 #include "engine/core/constants.h"
 #include "engine/orbit/utc.h"
+#include "hil/faults/faulty_commands.h"
+#include "hil/faults/faulty_sink.h"
 #include "tools/starloop/pacing.h"
 #include "tools/starloop/run_folder.h"
 #include "tools/starloop/subcommands.h"
@@ -41,8 +43,9 @@ void run_tracker(drivers::MockLink& link, tracker::Tracker& tracker, const std::
 /// Takes the loop's records, keeps them, and shows where it is.
 class Observer {
  public:
-  Observer(const Scenario& scenario, hil::FrameLoop& loop, std::uint64_t frames, bool quiet)
-      : scenario_(scenario), loop_(loop), due_(frames), quiet_(quiet) {
+  Observer(const Scenario& scenario, hil::FrameLoop& loop, std::array<hil::FaultRing*, 2> faults,
+           std::uint64_t frames, bool quiet)
+      : scenario_(scenario), loop_(loop), faults_(faults), due_(frames), quiet_(quiet) {
     log_.frames.reserve(frames);
     log_.commands.reserve(frames * 2);
     terminal_ = isatty(fileno(stdout)) != 0;
@@ -62,6 +65,8 @@ class Observer {
  private:
   void take() {
     for (hil::CommandRecord c; loop_.commands().pop(c);) log_.commands.push_back(c);
+    for (hil::FaultRing* ring : faults_)
+      for (hil::FaultRecord f; ring->pop(f);) log_.faults.push_back(f);
     bool any = false;
     for (hil::FrameRecord r; loop_.frames().pop(r); any = true) {
       if (r.late > Duration{1'000'000}) ++late_;
@@ -91,6 +96,7 @@ class Observer {
 
   const Scenario& scenario_;
   hil::FrameLoop& loop_;
+  std::array<hil::FaultRing*, 2> faults_;  // of frames, of commands
   std::uint64_t due_;
   bool quiet_;
   bool terminal_ = false;
@@ -158,9 +164,36 @@ std::uint64_t of_cause(const hil::LoopReport& report, hil::LateCause cause) {
   return report.late_by_cause[static_cast<std::size_t>(cause)];
 }
 
+nlohmann::ordered_json faults_injected(const hil::FaultSpec& spec, const hil::FaultySink& frames,
+                                       const hil::FaultyCommands& commands) {
+  nlohmann::ordered_json by_name = nlohmann::ordered_json::object();
+  for (std::size_t i = 0; i < spec.faults.size(); ++i)
+    by_name[spec.faults[i].name] = frames.happened()[i] + commands.happened()[i];
+  const hil::FrameFaultCounts& f = frames.counts();
+  const hil::CommandFaultCounts& c = commands.counts();
+  return {{"by_name", by_name},
+          {"frames",
+           {{"taken", f.taken},
+            {"delivered", f.delivered},
+            {"dropped", f.dropped},
+            {"away", f.away},
+            {"refused", f.refused},
+            {"held", f.held},
+            {"copies", f.copies}}},
+          {"commands",
+           {{"taken", c.taken},
+            {"delivered", c.delivered},
+            {"lost", c.lost},
+            {"refused", c.refused},
+            {"held", c.held},
+            {"copies", c.copies},
+            {"stand_ins", c.stand_ins}}},
+          {"records_lost", f.records_lost + c.records_lost}};
+}
+
 void write_report(const fs::path& folder, const Scenario& s, const engine::Pass& pass,
-                  const RunLog& log, const Verdict& v, const PngRecorder& recorder, bool open_loop,
-                  int threads) {
+                  const RunLog& log, const Verdict& v, const PngRecorder& recorder,
+                  const nlohmann::ordered_json& faults, bool open_loop, int threads) {
   const hil::LoopReport& l = log.loop;
   nlohmann::ordered_json report = {
       {"scenario", s.name},
@@ -188,6 +221,7 @@ void write_report(const fs::path& folder, const Scenario& s, const engine::Pass&
         {"records_lost", l.records_lost}}},
       {"commands",
        {{"taken", l.commands}, {"refused", l.command_faults}, {"lost", l.commands_lost}}},
+      {"faults_injected", faults},
       {"camera",
        {{"ifov_rad", s.scene.camera.ifov_rad()},
         {"width_px", s.scene.camera.width_px},
@@ -265,7 +299,6 @@ int run_pass(const CommonOptions& options, const RunOptions& run) {
   drivers::MockLink link(spec.width_px, spec.height_px);
   PngRecorder recorder(folder, scenario.run.record_every, spec.width_px, spec.height_px,
                        spec.when_busy);
-  hil::FanOut sinks(link, recorder);
   tracker::TrackerSpec tracker_spec = scenario.tracker;
   tracker_spec.reports_only = run.open_loop;
   tracker::Tracker tracker(tracker_spec, spec.width_px, spec.height_px);
@@ -274,13 +307,21 @@ int run_pass(const CommonOptions& options, const RunOptions& run) {
   hil::ClosedLoopPointing pointing(rig.prediction(), guidance, scenario.actuator);
   std::signal(SIGINT, on_signal);
   std::signal(SIGTERM, on_signal);
-  if (!pacing.wait_for_reader(sinks, [] { return interrupted != 0; })) {
+  if (!pacing.wait_for_reader(link, [] { return interrupted != 0; })) {
     spdlog::error("nobody reads the frames after {:g} s", seconds(scenario.run.start_timeout));
     return kDeviceFault;
   }
   pacing.start();
-  hil::FrameLoop loop(spec, pacing.clock(), pointing, rig.chain(), sinks, link);
-  Observer observer(scenario, loop, spec.frames, options.quiet);
+  const bool lockstep = scenario.run.clock == ClockMode::kLockstep;
+  hil::FaultySink faulty(scenario.faults, {spec.width_px, spec.height_px}, spec.start, link,
+                         lockstep ? nullptr : &pacing.clock());
+  hil::FaultyCommands faulty_commands(
+      scenario.faults, link, faulty.news(),
+      lockstep ? hil::FaultyCommands::Pace::kLockstep : hil::FaultyCommands::Pace::kRealtime);
+  hil::FanOut sinks(faulty, recorder);
+  hil::FrameLoop loop(spec, pacing.clock(), pointing, rig.chain(), sinks, faulty_commands);
+  Observer observer(scenario, loop, {&faulty.records(), &faulty_commands.records()}, spec.frames,
+                    options.quiet);
   {
     std::stop_source loop_stop;
     std::jthread device([&](const std::stop_token& stop) { run_tracker(link, tracker, stop); });
@@ -295,7 +336,9 @@ int run_pass(const CommonOptions& options, const RunOptions& run) {
   const RunLog& log = observer.log();
   const Verdict verdict = judge(scenario, log, run.open_loop);
   write_tables(folder, scenario, log);
-  write_report(folder, scenario, pass, log, verdict, recorder, run.open_loop, rig.threads());
+  write_report(folder, scenario, pass, log, verdict, recorder,
+               faults_injected(scenario.faults, faulty, faulty_commands), run.open_loop,
+               rig.threads());
   print_summary(log, verdict, scenario, run.open_loop);
   if (!draw_pictures(folder, run.compare))
     spdlog::warn(

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdio>
 #include <ctime>
+#include <fstream>
 #include <map>
 #include <memory>
 #include <stdexcept>
@@ -162,6 +163,12 @@ void write_commands(const fs::path& folder, const RunLog& log) {
 
 void write_tables(const fs::path& folder, const Scenario& scenario, const RunLog& log) {
   write_commands(folder, log);
+  if (!scenario.faults.faults.empty()) {
+    std::ofstream faults(folder / "faults.csv");
+    hil::write_faults_csv(faults, scenario.faults, log.faults);
+    if (!faults.flush())
+      throw std::runtime_error((folder / "faults.csv").string() + ": not written");
+  }
   std::map<std::uint64_t, hil::Detection> seen;  // by the frame it was seen in
   for (const hil::CommandRecord& r : log.commands)
     if (r.command.detection.confidence > 0.0F) seen[r.command.answers_frame] = r.command.detection;

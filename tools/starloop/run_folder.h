@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "hil/camera_link.h"
+#include "hil/faults/fault_record.h"
 #include "hil/frame_loop.h"
 #include "hil/spsc_ring.h"
 #include "tools/starloop/scenario.h"
@@ -56,6 +57,7 @@ class PngRecorder final : public hil::FrameSink {
 struct RunLog {
   std::vector<hil::FrameRecord> frames;
   std::vector<hil::CommandRecord> commands;
+  std::vector<hil::FaultRecord> faults;
   hil::LoopReport loop;
   std::string realtime;                       ///< what the system granted
   std::optional<hil::WakeHistogram> machine;  ///< its own stalls; in real time only
@@ -75,7 +77,7 @@ struct PointingScore {
 /// out/<scenario>/<UTC time>/, and the link out/latest to it. Throws std::runtime_error.
 [[nodiscard]] std::filesystem::path make_run_folder(const std::string& out,
                                                     const std::string& scenario);
-/// frames.csv and commands.csv.
+/// frames.csv and commands.csv; faults.csv when the scenario has any.
 void write_tables(const std::filesystem::path& folder, const Scenario& scenario, const RunLog& log);
 /// The contact sheet and the plot, by tools/plot/run_report.py; false when python3 or matplotlib
 /// is not there.

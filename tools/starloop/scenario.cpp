@@ -137,6 +137,7 @@ Scenario read_scenario(const ConfigReader& config) {
                                           {"vertical", hil::RollRule::kVertical}});
   s.actuator = hil::read_actuator(config.table("actuator"));
   s.realtime = hil::read_realtime(config.table("realtime"));
+  s.faults = hil::read_faults(config, s.scene.seed, s.scene.camera.width_px, s.detector.bits);
   s.tracker = read_tracker(config.table("tracker"), s.scene.camera);
   config.reject_unknown_keys();
   return s;

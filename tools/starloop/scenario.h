@@ -10,6 +10,7 @@
 #include "engine/render/path_tracer.h"
 #include "engine/scene/brdf.h"
 #include "hil/closed_loop_pointing.h"
+#include "hil/faults/fault_spec.h"
 #include "hil/frame_loop.h"
 #include "hil/realtime.h"
 #include "tools/tracker/tracker.h"
@@ -65,6 +66,7 @@ struct Scenario {
   hil::RollRule roll = hil::RollRule::kCelestial;
   hil::ActuatorSpec actuator;
   hil::RealtimeSpec realtime;
+  hil::FaultSpec faults;
   tracker::TrackerSpec tracker;
 };
 

@@ -396,7 +396,7 @@ TEST(ReadMaterials, TakesEveryTableBelowMaterials) {
   EXPECT_EQ(materials[0].name, "a");
   EXPECT_EQ(materials[1].name, "b");
   const Brdf& same = brdf_of("silicon", Variant::kPaper);
-  EXPECT_EQ(materials[0].brdf.eval(tilted(20), tilted(-21)), same.eval(tilted(20), tilted(-21)));
+  EXPECT_EQ(materials[0].brdf().eval(tilted(20), tilted(-21)), same.eval(tilted(20), tilted(-21)));
   config.reject_unknown_keys();
 }
 
