@@ -32,7 +32,7 @@ struct News {
 
 asio::ip::address checked_address(const CommandPortSpec& spec) {
   asio::error_code error;
-  const asio::ip::address address = asio::ip::make_address(spec.address, error);
+  asio::ip::address address = asio::ip::make_address(spec.address, error);
   if (error)
     throw ConfigError(spec.address_where + " must be an IP address, got \"" + spec.address + "\"");
   if (!address.is_loopback() && spec.key_file.empty())
