@@ -12,7 +12,8 @@
 namespace drivers {
 
 /// A cable without hardware: frames cross it as the bytes of frame_packet.h, commands as those
-/// of hil/space_packet.h, and nothing else does. The device's side is the lower half of the interface.
+/// of hil/space_packet.h, and nothing else does. The device's side is the lower half of the
+/// interface.
 ///
 /// A device that reads slowly holds its slots; the camera's side then says kBusy after its timeout
 /// and goes on. Thread: sender for send(), receiver for receive(), one device thread for the rest.
