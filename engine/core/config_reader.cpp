@@ -208,6 +208,13 @@ std::string ConfigTable::text_or(const std::string& key, const std::string& fall
   return has(key) ? text(key) : fallback;
 }
 
+bool ConfigTable::flag_or(const std::string& key, bool fallback) const {
+  if (!has(key)) return fallback;
+  const toml::node* node = document_->find(path(key));
+  if (!node->is_boolean()) fail(key, "must be true or false, got " + kind_text(*node));
+  return node->as_boolean()->get();
+}
+
 bool ConfigTable::is_text(const std::string& key) const {
   const toml::node* node = document_->find(path(key));
   return node != nullptr && node->is_string();

@@ -91,6 +91,7 @@ class ConfigTable {
                                         const Range& range) const;
   [[nodiscard]] std::string text(const std::string& key) const;
   [[nodiscard]] std::string text_or(const std::string& key, const std::string& fallback) const;
+  [[nodiscard]] bool flag_or(const std::string& key, bool fallback) const;  ///< true or false
   [[nodiscard]] bool is_text(const std::string& key) const;
 
   template <class Value>
