@@ -19,6 +19,8 @@
 #include <assert.h>
 #include <stdint.h>
 
+/* Names as in C: NOLINTBEGIN(readability-identifier-naming) */
+
 #define STARLOOP_SHM_MAGIC UINT64_C(0x31304D4853504C53) /* "SLPSHM01" */
 
 enum {
@@ -90,5 +92,7 @@ static inline uint64_t starloop_slot_word(uint64_t ticket, unsigned state) {
 }
 static inline uint64_t starloop_slot_ticket(uint64_t word) { return word >> 2; }
 static inline unsigned starloop_slot_state(uint64_t word) { return (unsigned)(word & 3U); }
+
+/* NOLINTEND(readability-identifier-naming) */
 
 #endif

@@ -29,6 +29,8 @@
 extern "C" {
 #endif
 
+/* Names as in C: NOLINTBEGIN(readability-identifier-naming) */
+
 typedef enum {
   STARLOOP_OK = 0,
   STARLOOP_TIMEOUT = 1,      /* nothing happened in time */
@@ -153,6 +155,8 @@ size_t starloop_encode(const starloop_command *command, uint8_t out[STARLOOP_LAR
 
 /* What the last failed call of this thread found wrong. Never NULL. */
 const char *starloop_last_error(void);
+
+/* NOLINTEND(readability-identifier-naming) */
 
 #ifdef __cplusplus
 }

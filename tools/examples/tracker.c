@@ -67,12 +67,11 @@ int main(int argc, char **argv) {
     const int64_t middle_ns = frame.shutter_open_ns + frame.exposure_ns / 2;
     if (find_target(&frame, &answer.detection)) {
       /* What is wrong with the pointing: where the target is seen, plus the trim that was on. */
-      const int32_t size_px[2] = {frame.width_px, frame.height_px};
+      const int32_t middle_px[2] = {frame.width_px / 2, frame.height_px / 2};
       const double dt = (double)(middle_ns - last_ns) * 1e-9;
       for (int i = 0; i < 2; ++i) {
         const double seen_rad =
-            frame.trim_rad[i] +
-            ((double)answer.detection.centroid_px[i] - size_px[i] / 2) * ifov_rad;
+            frame.trim_rad[i] + ((double)answer.detection.centroid_px[i] - middle_px[i]) * ifov_rad;
         /* An alpha-beta filter: an offset, and the rate at which it grows. */
         const double predicted = offset_rad[i] + rate_rad_s[i] * dt;
         const double surprise = seen_rad - predicted;
