@@ -12,8 +12,10 @@
 #include "engine/core/constants.h"
 #include "engine/orbit/utc.h"
 #include "hil/steady_clock.h"
+#include "tools/starloop/report_json.h"
 #include "tools/starloop/run_folder.h"
 #include "tools/starloop/subcommands.h"
+#include "tools/starloop/truth_files.h"
 
 namespace starloop {
 namespace {
@@ -43,8 +45,9 @@ void run_tracker(drivers::MockLink& link, tracker::Tracker& tracker, const std::
 /// Takes the loop's records, keeps them, and shows where it is.
 class Observer {
  public:
-  Observer(const Scenario& scenario, hil::FrameLoop& loop, std::uint64_t frames, bool quiet)
-      : scenario_(scenario), loop_(loop), due_(frames), quiet_(quiet) {
+  Observer(const Scenario& scenario, hil::FrameLoop& loop, TruthRecorder& truth,
+           std::uint64_t frames, bool quiet)
+      : scenario_(scenario), loop_(loop), truth_(truth), due_(frames), quiet_(quiet) {
     log_.frames.reserve(frames);
     log_.commands.reserve(frames * 2);
     terminal_ = isatty(fileno(stdout)) != 0;
@@ -69,6 +72,7 @@ class Observer {
       if (r.late > Duration{1'000'000}) ++late_;
       dropped_ += r.skipped_before + (r.handed_over ? 0U : 1U);
       log_.frames.push_back(r);
+      truth_.add(r);
       // A log gets one line in ten frames, a terminal one line that changes.
       if (!terminal_ && r.sequence % 10 == 0) show(r, '\n');
     }
@@ -93,6 +97,7 @@ class Observer {
 
   const Scenario& scenario_;
   hil::FrameLoop& loop_;
+  TruthRecorder& truth_;
   std::uint64_t due_;
   bool quiet_;
   bool terminal_ = false;
@@ -141,7 +146,9 @@ std::unique_ptr<hil::Clock> make_clock(const Scenario& scenario, engine::SimTime
 struct Verdict {
   PointingScore whole;
   PointingScore held;
-  bool good = true;
+  DetectionVerdict detection;
+  bool held_good = true;
+  bool good = true;  ///< that, and what was asked of detections
 };
 
 Verdict judge(const Scenario& scenario, const RunLog& log, bool open_loop) {
@@ -150,13 +157,16 @@ Verdict judge(const Scenario& scenario, const RunLog& log, bool open_loop) {
   v.held = score_pointing(scenario, log, scenario.criteria.after_s);
   const double limit = scenario.criteria.pointing_rms_px;
   if (!open_loop && limit > 0.0)
-    v.good = v.held.frames > 0 && v.held.without_target == 0 && v.held.rms_px <= limit;
+    v.held_good = v.held.frames > 0 && v.held.without_target == 0 && v.held.rms_px <= limit;
+  v.detection =
+      judge_detections(scenario.criteria.detection, scenario.scene.camera, log, open_loop);
+  v.good = v.held_good && v.detection.not_met.empty();
   return v;
 }
 
 void write_report(const fs::path& folder, const Scenario& s, const engine::Pass& pass,
-                  const RunLog& log, const Verdict& v, const PngRecorder& recorder, bool open_loop,
-                  int threads) {
+                  const RunLog& log, const Verdict& v, const PngRecorder& recorder,
+                  const TruthRecorder& truth, bool open_loop, int threads) {
   const hil::LoopReport& l = log.loop;
   nlohmann::ordered_json report = {
       {"scenario", s.name},
@@ -185,6 +195,10 @@ void write_report(const fs::path& folder, const Scenario& s, const engine::Pass&
         {"width_px", s.scene.camera.width_px},
         {"height_px", s.scene.camera.height_px}}},
       {"pictures", {{"written", recorder.written()}, {"left_out", recorder.left_out()}}},
+      {"truth",
+       {{"frames", truth.lines()},
+        {"frames_lost", truth.records_lost()},
+        {"masks_lost", truth.masks_lost()}}},
       {"answer_missing", l.answer_missing},
       {"command_latency_frames", 1},
       {"pointing",
@@ -195,12 +209,24 @@ void write_report(const fs::path& folder, const Scenario& s, const engine::Pass&
         {"frames_without_target", v.whole.without_target},
         {"lost_after_s",
          v.whole.lost_after_s ? nlohmann::json(*v.whole.lost_after_s) : nlohmann::json(nullptr)},
-        {"limit_px", s.criteria.pointing_rms_px}}},
+        {"limit_px", s.criteria.pointing_rms_px},
+        {"met", open_loop ? nlohmann::json(nullptr) : nlohmann::json(v.held_good)}}},
+      {"statistics", statistics_json(log)},
+      {"detection", detection_json(v.detection)},
       {"left_out",
        {"the Earth and stars behind the target", "defocus", "the Sun's disc",
         "PRNU, DSNU and defects"}},
       {"criteria_met", open_loop ? nlohmann::json(nullptr) : nlohmann::json(v.good)}};
   std::ofstream(folder / "report.json") << report.dump(2) << "\n";
+}
+
+void print_detections(const DetectionVerdict& verdict) {
+  const hil::DetectionScore& d = verdict.score;
+  spdlog::info("detections: {} = {} matches + {} false alarms + {} duplicates + {} strays",
+               d.detections, d.matches, d.false_alarms, d.duplicates, d.strays);
+  spdlog::info("detected in {} of the {} frames that show the target; centroid {:.3f} px rms",
+               d.detected, d.detectable, d.centroid_rms_px);
+  for (const std::string& sentence : verdict.not_met) spdlog::error("{}", sentence);
 }
 
 void print_summary(const RunLog& log, const Verdict& v, const Scenario& s, bool open_loop) {
@@ -216,9 +242,17 @@ void print_summary(const RunLog& log, const Verdict& v, const Scenario& s, bool 
   if (!open_loop) {
     spdlog::info(
         "pointing error from {:g} s on: {:.3f} px rms, {:.2f} px at worst ({}, limit {:g})",
-        s.criteria.after_s, v.held.rms_px, v.held.worst_px, v.good ? "good" : "NOT GOOD ENOUGH",
+        s.criteria.after_s, v.held.rms_px, v.held.worst_px,
+        v.held_good ? "good" : "NOT GOOD ENOUGH", s.criteria.pointing_rms_px);
+  }
+  if (!v.held_good) {
+    spdlog::error(
+        "the pointing error from {:g} s on is {:.4g} px rms over {} frames, {} of the "
+        "run's without target, and must be at most {:g}",
+        s.criteria.after_s, v.held.rms_px, v.held.frames, v.whole.without_target,
         s.criteria.pointing_rms_px);
   }
+  print_detections(v.detection);
 }
 
 }  // namespace
@@ -242,7 +276,13 @@ int run_pass(const CommonOptions& options, const RunOptions& run) {
   drivers::MockLink link(spec.width_px, spec.height_px);
   PngRecorder recorder(folder, scenario.run.record_every, spec.width_px, spec.height_px,
                        spec.when_busy);
-  hil::FanOut sinks(link, recorder);
+  TruthRecorder truth({.folder = folder,
+                       .picture_every = scenario.run.record_every,
+                       .width_px = spec.width_px,
+                       .height_px = spec.height_px,
+                       .when_busy = spec.when_busy});
+  hil::FanOut recorders(recorder, truth);
+  hil::FanOut sinks(link, recorders);
   tracker::TrackerSpec tracker_spec = scenario.tracker;
   tracker_spec.reports_only = run.open_loop;
   tracker::Tracker tracker(tracker_spec, spec.width_px, spec.height_px);
@@ -252,7 +292,7 @@ int run_pass(const CommonOptions& options, const RunOptions& run) {
   const std::unique_ptr<hil::Clock> clock = make_clock(scenario, spec.start);
   hil::FrameLoop loop(spec, *clock, pointing, rig.chain(), sinks, link);
 
-  Observer observer(scenario, loop, spec.frames, options.quiet);
+  Observer observer(scenario, loop, truth, spec.frames, options.quiet);
   std::signal(SIGINT, on_signal);
   std::signal(SIGTERM, on_signal);
   {
@@ -262,15 +302,19 @@ int run_pass(const CommonOptions& options, const RunOptions& run) {
     observer.log().loop = loop.run(loop_stop.get_token());
   }
   recorder.finish();
+  truth.finish();
 
   const RunLog& log = observer.log();
   const Verdict verdict = judge(scenario, log, run.open_loop);
   write_tables(folder, scenario, log);
-  write_report(folder, scenario, pass, log, verdict, recorder, run.open_loop, rig.threads());
+  write_detections(folder, log, verdict.detection.score);
+  write_report(folder, scenario, pass, log, verdict, recorder, truth, run.open_loop, rig.threads());
   print_summary(log, verdict, scenario, run.open_loop);
   if (!draw_pictures(folder, run.compare))
     spdlog::warn(
         "no contact sheet and no plot: /usr/bin/python3 with matplotlib did not draw them");
+  if (!write_page(folder))
+    spdlog::warn("no report.html: /usr/bin/python3 with matplotlib did not write it");
   spdlog::info("results: {}", folder.string());
   if (log.loop.answer_missing) {
     spdlog::error("the software under test gave no answer within {:g} s",

@@ -200,12 +200,14 @@ void write_tables(const fs::path& folder, const Scenario& scenario, const RunLog
   }
 }
 
-bool draw_pictures(const fs::path& folder, const std::string& compare) {
-  // Debian's own python3 is the one that has python3-matplotlib.
+namespace {
+
+/// A script of tools/plot, by Debian's own python3: the one that has python3-matplotlib.
+bool run_script(const char* name, const fs::path& folder, const std::string& more) {
   std::string python = "/usr/bin/python3";
-  std::string script = std::string(STARLOOP_SOURCE_DIR) + "/tools/plot/run_report.py";
+  std::string script = std::string(STARLOOP_SOURCE_DIR) + "/tools/plot/" + name;
   std::string where = folder.string();
-  std::string other = compare;
+  std::string other = more;
   char* arguments[] = {python.data(), script.data(), where.data(),
                        other.empty() ? nullptr : other.data(), nullptr};
   pid_t child = 0;
@@ -215,5 +217,13 @@ bool draw_pictures(const fs::path& folder, const std::string& compare) {
   }
   return WIFEXITED(status) && WEXITSTATUS(status) == 0;
 }
+
+}  // namespace
+
+bool draw_pictures(const fs::path& folder, const std::string& compare) {
+  return run_script("run_report.py", folder, compare);
+}
+
+bool write_page(const fs::path& folder) { return run_script("report_html.py", folder, ""); }
 
 }  // namespace starloop

@@ -78,5 +78,7 @@ void write_tables(const std::filesystem::path& folder, const Scenario& scenario,
 /// The contact sheet and the plot, by tools/plot/run_report.py; false when python3 or matplotlib
 /// is not there.
 [[nodiscard]] bool draw_pictures(const std::filesystem::path& folder, const std::string& compare);
+/// report.html, by tools/plot/report_html.py, of what is in the folder by now; false as above.
+[[nodiscard]] bool write_page(const std::filesystem::path& folder);
 
 }  // namespace starloop

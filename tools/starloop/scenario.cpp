@@ -98,7 +98,8 @@ Scenario read_scenario(const ConfigReader& config) {
   s.run = read_run(config.table("run"));
   const ConfigTable criteria = config.table("criteria");
   s.criteria = {criteria.number_or("pointing_rms_px", 0.0, engine::at_least(0.0)),
-                criteria.number_or("after_s", 0.0, engine::at_least(0.0))};
+                criteria.number_or("after_s", 0.0, engine::at_least(0.0)),
+                hil::read_criteria(criteria)};
   s.camera_orbit = engine::read_elements(config.table("orbit.camera"));
   s.target_orbit = engine::read_elements(config.table("orbit.target"));
 

@@ -11,6 +11,7 @@
 #include "engine/scene/brdf.h"
 #include "hil/closed_loop_pointing.h"
 #include "hil/frame_loop.h"
+#include "hil/score.h"
 #include "tools/tracker/tracker.h"
 
 namespace starloop {
@@ -33,6 +34,7 @@ struct RunSpec {
 struct Criteria {
   double pointing_rms_px = 0;  ///< 0: none
   double after_s = 0;
+  hil::DetectionCriteria detection;
 };
 
 /// All Specs of a run, as the rooms have read and checked them.
