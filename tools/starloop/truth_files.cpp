@@ -15,7 +15,7 @@ using Json = nlohmann::ordered_json;
 
 namespace {
 
-// Frames that are handed over faster than a disk takes their masks: 8 runs a row, as the loop.
+// As much as the loop's own masks hold.
 constexpr std::size_t kRunsPerRow = 8;
 
 /// What is not a number, JSON has no word for but null.
