@@ -4,6 +4,7 @@
 #include <thread>
 #include <utility>
 
+#include "hil/decisions.h"
 #include "hil/steady_clock.h"
 
 namespace hil {
@@ -64,7 +65,7 @@ LoopReport FrameLoop::run(const std::stop_token& stop) {
       ++report.dropped;
     }
     if (!frames_.push(record)) ++report.records_lost;
-    if (record.handed_over && spec_.answer_timeout > Duration{} &&
+    if (record.handed_over && spec_.answer_timeout > Duration{} && spec_.replay == nullptr &&
         !wait_for_answer(k, stop, report)) {
       break;
     }
@@ -85,15 +86,23 @@ LoopReport FrameLoop::run(const std::stop_token& stop) {
 
 /// The first frame from `k` on whose shutter can still open on time.
 std::uint64_t FrameLoop::skip_missed(std::uint64_t k, LoopReport& report) noexcept {
-  const Duration behind = clock_.now() - opening(k);
-  if (behind <= kLateLimit) return k;
-  const auto periods =
-      static_cast<std::uint64_t>((behind + spec_.period - Duration(1)) / spec_.period);
+  std::uint64_t periods = 0;
+  if (spec_.replay != nullptr) {
+    periods = next_due(k) - k;
+  } else if (const Duration behind = clock_.now() - opening(k); behind > kLateLimit) {
+    periods = static_cast<std::uint64_t>((behind + spec_.period - Duration(1)) / spec_.period);
+  }
   const std::uint64_t skipped = std::min(periods, spec_.frames - k);
   report.due += skipped;
   report.skipped += skipped;
   skipped_before_ += skipped;
   return k + skipped;
+}
+
+std::uint64_t FrameLoop::next_due(std::uint64_t k) noexcept {
+  const auto& due = spec_.replay->due;
+  while (next_due_ < due.size() && due[next_due_].frame < k) ++next_due_;
+  return next_due_ < due.size() ? due[next_due_].frame : spec_.frames;
 }
 
 void FrameLoop::take_command(const Command& command, std::uint64_t k, LoopReport& report) noexcept {
@@ -109,13 +118,21 @@ void FrameLoop::obey(std::uint64_t k, LoopReport& report) noexcept {
     // Up to here the commands before this slot hold.
     static_cast<void>(pointing_.attitude(slot));
   }
+  if (spec_.replay != nullptr) {
+    const auto& commands = spec_.replay->commands;
+    const auto now = [&] { return k >= spec_.frames || commands[next_command_].frame <= k; };
+    for (; next_command_ < commands.size() && now(); ++next_command_)
+      take_command(commands[next_command_].command, k, report);
+    return;
+  }
   for (const Command& command : waiting_) take_command(command, k, report);
   waiting_.clear();
   for (Command command; received_.pop(command);) take_command(command, k, report);
 }
 
 bool FrameLoop::acquire_slot(const std::stop_token& stop, std::size_t& slot) noexcept {
-  if (spec_.when_busy == WhenBusy::kDropFrame) {
+  if (spec_.replay != nullptr && !spec_.replay->due[next_due_].exposed) return false;
+  if (spec_.when_busy == WhenBusy::kDropFrame && spec_.replay == nullptr) {
     if (!free_count_.try_acquire()) return false;
   } else {
     while (!free_count_.try_acquire_for(kPatience))

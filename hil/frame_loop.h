@@ -14,6 +14,8 @@ namespace hil {
 /// When the link still holds every slot: the rig must keep time, a rehearsal must keep every frame.
 enum class WhenBusy : std::uint8_t { kDropFrame, kWait };
 
+struct Decisions;
+
 struct LoopSpec {
   engine::SimTime start{};
   engine::Duration period{100'000'000};
@@ -27,6 +29,10 @@ struct LoopSpec {
   /// Lockstep: the next frame waits this long for the answer to the last. Zero: it does not wait.
   engine::Duration answer_timeout{};
   engine::Duration send_timeout{50'000'000};
+  /// A replay: which frames are skipped, dropped and exposed, and which commands are obeyed when,
+  /// is what these say; neither the clock nor the link nor a command source decides. Outlives the
+  /// loop.
+  const Decisions* replay = nullptr;
   int width_px = 1024;
   int height_px = 1024;
   int bits = 11;
@@ -99,6 +105,8 @@ class FrameLoop {
     return spec_.start + spec_.period * static_cast<std::int64_t>(k);
   }
   [[nodiscard]] std::uint64_t skip_missed(std::uint64_t k, LoopReport& report) noexcept;
+  /// The same in a replay.
+  [[nodiscard]] std::uint64_t next_due(std::uint64_t k) noexcept;
   [[nodiscard]] bool acquire_slot(const std::stop_token& stop, std::size_t& slot) noexcept;
   void obey(std::uint64_t k, LoopReport& report) noexcept;
   void expose(std::uint64_t k, std::size_t slot, FrameRecord& record) noexcept;
@@ -125,6 +133,8 @@ class FrameLoop {
   std::counting_semaphore<> received_count_{0};
 
   std::vector<Command> waiting_;  // taken, not yet obeyed; the loop's own
+  std::size_t next_due_ = 0;      // of a replay's decisions
+  std::size_t next_command_ = 0;  // of a replay's decisions
   std::uint64_t skipped_before_ = 0;
   LoopCounts counts_;
   LoopReport sender_counts_;    // the sender's own until it is joined
