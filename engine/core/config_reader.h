@@ -48,6 +48,9 @@ struct Range {
 
 class ConfigTable;
 
+/// The bytes of a scenario file. Throws ConfigError.
+[[nodiscard]] std::string scenario_text(const std::string& path);
+
 /// A scenario: TOML text, and the line that each value stands on.
 ///
 /// Every value is asked for by name and checked there; what nobody asked for is an unknown key, and

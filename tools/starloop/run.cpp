@@ -1,6 +1,7 @@
 #include <cmath>
 #include <csignal>
 #include <cstdio>
+#include <cstring>
 #include <fstream>
 #include <stop_token>
 
@@ -43,8 +44,9 @@ void run_tracker(drivers::MockLink& link, tracker::Tracker& tracker, const std::
 /// Takes the loop's records, keeps them, and shows where it is.
 class Observer {
  public:
-  Observer(const Scenario& scenario, hil::FrameLoop& loop, std::uint64_t frames, bool quiet)
-      : scenario_(scenario), loop_(loop), due_(frames), quiet_(quiet) {
+  Observer(const Scenario& scenario, hil::FrameLoop& loop, hil::Recorder& recorder,
+           std::uint64_t frames, bool quiet)
+      : scenario_(scenario), loop_(loop), recorder_(recorder), due_(frames), quiet_(quiet) {
     log_.frames.reserve(frames);
     log_.commands.reserve(frames * 2);
     terminal_ = isatty(fileno(stdout)) != 0;
@@ -63,16 +65,26 @@ class Observer {
 
  private:
   void take() {
-    for (hil::CommandRecord c; loop_.commands().pop(c);) log_.commands.push_back(c);
     bool any = false;
     for (hil::FrameRecord r; loop_.frames().pop(r); any = true) {
+      // The log wants a frame after the commands that it obeyed.
+      take_commands();
+      recorder_.log(r);
       if (r.late > Duration{1'000'000}) ++late_;
       dropped_ += r.skipped_before + (r.handed_over ? 0U : 1U);
       log_.frames.push_back(r);
       // A log gets one line in ten frames, a terminal one line that changes.
       if (!terminal_ && r.sequence % 10 == 0) show(r, '\n');
     }
+    take_commands();
     if (any && terminal_) show(log_.frames.back(), '\r');
+  }
+
+  void take_commands() {
+    for (hil::CommandRecord c; loop_.commands().pop(c);) {
+      recorder_.log(c);
+      log_.commands.push_back(c);
+    }
   }
 
   void show(const hil::FrameRecord& r, char end) const {
@@ -93,6 +105,7 @@ class Observer {
 
   const Scenario& scenario_;
   hil::FrameLoop& loop_;
+  hil::Recorder& recorder_;
   std::uint64_t due_;
   bool quiet_;
   bool terminal_ = false;
@@ -155,8 +168,8 @@ Verdict judge(const Scenario& scenario, const RunLog& log, bool open_loop) {
 }
 
 void write_report(const fs::path& folder, const Scenario& s, const engine::Pass& pass,
-                  const RunLog& log, const Verdict& v, const PngRecorder& recorder, bool open_loop,
-                  int threads) {
+                  const RunLog& log, const Verdict& v, const hil::RecorderReport& kept,
+                  bool open_loop, int threads) {
   const hil::LoopReport& l = log.loop;
   nlohmann::ordered_json report = {
       {"scenario", s.name},
@@ -184,7 +197,8 @@ void write_report(const fs::path& folder, const Scenario& s, const engine::Pass&
        {{"ifov_rad", s.scene.camera.ifov_rad()},
         {"width_px", s.scene.camera.width_px},
         {"height_px", s.scene.camera.height_px}}},
-      {"pictures", {{"written", recorder.written()}, {"left_out", recorder.left_out()}}},
+      {"pictures", {{"written", kept.kept}, {"left_out", kept.left_out}, {"failed", kept.failed}}},
+      {"log", {{"records", kept.records}, {"lost", kept.records_lost}}},
       {"answer_missing", l.answer_missing},
       {"command_latency_frames", 1},
       {"pointing",
@@ -221,12 +235,22 @@ void print_summary(const RunLog& log, const Verdict& v, const Scenario& s, bool 
   }
 }
 
+/// A disk that was full or slow is no reason to stop, and none to keep quiet.
+void complain(const hil::RecorderReport& kept) {
+  if (kept.records_lost > 0)
+    spdlog::warn("record.slog: {} records lost ({}: {}); this run cannot be replayed in full",
+                 kept.records_lost, kept.log_fault.step, std::strerror(kept.log_fault.code));
+  if (kept.failed > 0 || !kept.failure.empty())
+    spdlog::warn("{} frames not kept: {}", kept.failed, kept.failure);
+}
+
 }  // namespace
 
 int run_pass(const CommonOptions& options, const RunOptions& run) {
   spdlog::set_pattern("%v");
   if (options.quiet) spdlog::set_level(spdlog::level::warn);
-  const Scenario scenario = load_scenario(options);
+  const ScenarioSource source = read_source(options);
+  const Scenario scenario = load_scenario(source);
   const engine::Pass pass = choose_pass(scenario);
   const hil::LoopSpec spec = loop_spec(scenario, pass);
   Rig rig(scenario, options.threads);
@@ -240,19 +264,21 @@ int run_pass(const CommonOptions& options, const RunOptions& run) {
       run.open_loop ? "; open loop" : "");
 
   drivers::MockLink link(spec.width_px, spec.height_px);
-  PngRecorder recorder(folder, scenario.run.record_every, spec.width_px, spec.height_px,
-                       spec.when_busy);
+  const auto store = make_store(folder, scenario, scenario.run.record_frames);
+  hil::Recorder recorder({.log_path = (folder / "record.slog").string(),
+                          .sync_every = scenario.run.sync_every,
+                          .record_every = scenario.run.record_every,
+                          .when_busy = spec.when_busy},
+                         log_start(source, scenario, spec, rig.threads()), store.get());
   hil::FanOut sinks(link, recorder);
   tracker::TrackerSpec tracker_spec = scenario.tracker;
   tracker_spec.reports_only = run.open_loop;
   tracker::Tracker tracker(tracker_spec, spec.width_px, spec.height_px);
-  hil::GuidanceError guidance = scenario.guidance;
-  guidance.start = spec.start;
-  hil::ClosedLoopPointing pointing(rig.prediction(), guidance, scenario.actuator);
+  hil::ClosedLoopPointing pointing = rig.pointing(spec.start);
   const std::unique_ptr<hil::Clock> clock = make_clock(scenario, spec.start);
   hil::FrameLoop loop(spec, *clock, pointing, rig.chain(), sinks, link);
 
-  Observer observer(scenario, loop, spec.frames, options.quiet);
+  Observer observer(scenario, loop, recorder, spec.frames, options.quiet);
   std::signal(SIGINT, on_signal);
   std::signal(SIGTERM, on_signal);
   {
@@ -261,12 +287,12 @@ int run_pass(const CommonOptions& options, const RunOptions& run) {
     std::jthread watcher([&](const std::stop_token& stop) { observer.watch(stop, loop_stop); });
     observer.log().loop = loop.run(loop_stop.get_token());
   }
-  recorder.finish();
-
   const RunLog& log = observer.log();
+  const hil::RecorderReport kept = recorder.finish(log.loop);
+  complain(kept);
   const Verdict verdict = judge(scenario, log, run.open_loop);
   write_tables(folder, scenario, log);
-  write_report(folder, scenario, pass, log, verdict, recorder, run.open_loop, rig.threads());
+  write_report(folder, scenario, pass, log, verdict, kept, run.open_loop, rig.threads());
   print_summary(log, verdict, scenario, run.open_loop);
   if (!draw_pictures(folder, run.compare))
     spdlog::warn(

@@ -52,6 +52,16 @@ RunSpec read_run(const ConfigTable& table) {
   return run;
 }
 
+void read_record(const ConfigTable& table, RunSpec& run) {
+  run.record_frames = table.choice_or<RecordFrames>("frames", "png",
+                                                    {{"none", RecordFrames::kNone},
+                                                     {"png", RecordFrames::kPng},
+                                                     {"fits", RecordFrames::kFits},
+                                                     {"cube", RecordFrames::kCube},
+                                                     {"raw", RecordFrames::kRaw}});
+  run.sync_every = from_seconds(table.number_or("sync_s", 5.0, engine::between(0.0, 3600.0)));
+}
+
 tracker::TrackerSpec read_tracker(const ConfigTable& table, const engine::CameraGeometry& camera) {
   tracker::TrackerSpec spec;
   spec.ifov_rad = camera.ifov_rad();
@@ -96,6 +106,7 @@ Scenario read_scenario(const ConfigReader& config) {
       "light_path", "apparent",
       {{"apparent", engine::LightPath::kApparent}, {"geometric", engine::LightPath::kGeometric}});
   s.run = read_run(config.table("run"));
+  read_record(config.table("record"), s.run);
   const ConfigTable criteria = config.table("criteria");
   s.criteria = {criteria.number_or("pointing_rms_px", 0.0, engine::at_least(0.0)),
                 criteria.number_or("after_s", 0.0, engine::at_least(0.0))};
@@ -133,17 +144,27 @@ Scenario read_scenario(const ConfigReader& config) {
   return s;
 }
 
-Scenario load_scenario(const CommonOptions& options) {
-  ConfigReader config = ConfigReader::from_file(options.file);
-  for (const std::string& assignment : options.overrides) config.set(assignment);
-  if (options.seed_given) config.set("scenario.seed=" + std::to_string(options.seed));
+ScenarioSource read_source(const CommonOptions& options) {
+  ScenarioSource source{options.file, engine::scenario_text(options.file), options.overrides};
+  if (options.seed_given)
+    source.overrides.push_back("scenario.seed=" + std::to_string(options.seed));
+  return source;
+}
+
+Scenario load_scenario(const ScenarioSource& source) {
+  ConfigReader config = ConfigReader::from_text(source.text, source.file);
+  for (const std::string& assignment : source.overrides) config.set(assignment);
   return read_scenario(config);
 }
+
+Scenario load_scenario(const CommonOptions& options) { return load_scenario(read_source(options)); }
 
 Rig::Rig(const Scenario& scenario, int threads)
     : epoch_(scenario.scene.epoch),
       path_(scenario.scene.light_path),
       roll_(scenario.roll),
+      guidance_(scenario.guidance),
+      actuator_(scenario.actuator),
       camera_(scenario.camera_orbit, epoch_),
       target_(scenario.target_orbit, epoch_),
       pool_(worker_threads(threads)) {
@@ -170,6 +191,12 @@ Rig::Rig(const Scenario& scenario, int threads)
 }
 
 hil::ScriptedPointing Rig::prediction() const { return {camera_, target_, epoch_, path_, roll_}; }
+
+hil::ClosedLoopPointing Rig::pointing(engine::SimTime start) const {
+  hil::GuidanceError guidance = guidance_;
+  guidance.start = start;
+  return {prediction(), guidance, actuator_};
+}
 
 std::vector<engine::Pass> passes_of(const Scenario& scenario) {
   const engine::Epoch epoch = scenario.scene.epoch;

@@ -16,6 +16,8 @@
 namespace starloop {
 
 enum class ClockMode : std::uint8_t { kRealtime, kLockstep };
+/// How frames are kept.
+enum class RecordFrames : std::uint8_t { kNone, kPng, kFits, kCube, kRaw };
 
 /// How a run goes: when, how fast, what is kept.
 struct RunSpec {
@@ -28,6 +30,8 @@ struct RunSpec {
   engine::Duration answer_timeout{};
   ClockMode clock = ClockMode::kRealtime;
   std::uint64_t record_every = 10;
+  RecordFrames record_frames = RecordFrames::kPng;
+  engine::Duration sync_every{};  ///< of the logs: what a power cut may cost
 };
 
 struct Criteria {
@@ -67,7 +71,16 @@ struct CommonOptions {
   std::uint64_t seed = 0;
 };
 
-/// Throws engine::ConfigError.
+/// What a scenario is read from: enough to read it again without the file.
+struct ScenarioSource {
+  std::string file;  ///< for complaints
+  std::string text;
+  std::vector<std::string> overrides;  ///< with --seed among them
+};
+
+/// All throw engine::ConfigError.
+[[nodiscard]] ScenarioSource read_source(const CommonOptions& options);
+[[nodiscard]] Scenario load_scenario(const ScenarioSource& source);
 [[nodiscard]] Scenario load_scenario(const CommonOptions& options);
 [[nodiscard]] Scenario read_scenario(const engine::ConfigReader& config);
 
@@ -78,6 +91,8 @@ class Rig {
 
   [[nodiscard]] engine::ImagingChain& chain() noexcept { return *chain_; }
   [[nodiscard]] hil::ScriptedPointing prediction() const;
+  /// The camera that obeys, in a run that begins at `start`.
+  [[nodiscard]] hil::ClosedLoopPointing pointing(engine::SimTime start) const;
   [[nodiscard]] const engine::KeplerPropagator& camera() const noexcept { return camera_; }
   [[nodiscard]] const engine::KeplerPropagator& target() const noexcept { return target_; }
   [[nodiscard]] int threads() const noexcept { return pool_.threads(); }
@@ -87,6 +102,8 @@ class Rig {
   engine::Epoch epoch_;
   engine::LightPath path_;
   hil::RollRule roll_;
+  hil::GuidanceError guidance_;
+  hil::ActuatorSpec actuator_;
   engine::KeplerPropagator camera_;
   engine::KeplerPropagator target_;
   engine::WorkerPool pool_;
