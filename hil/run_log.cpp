@@ -53,6 +53,7 @@ class Reader {
   explicit Reader(std::span<const std::byte> in) : left_(in) {}
 
   Reader& get(std::span<std::byte> out) {
+    if (out.empty()) return *this;
     if (out.size() > left_.size()) {
       short_ = true;
       left_ = {};
