@@ -246,9 +246,7 @@ int run_pass(const CommonOptions& options, const RunOptions& run) {
   tracker::TrackerSpec tracker_spec = scenario.tracker;
   tracker_spec.reports_only = run.open_loop;
   tracker::Tracker tracker(tracker_spec, spec.width_px, spec.height_px);
-  hil::GuidanceError guidance = scenario.guidance;
-  guidance.start = spec.start;
-  hil::ClosedLoopPointing pointing(rig.prediction(), guidance, scenario.actuator);
+  hil::ClosedLoopPointing pointing = make_pointing(scenario, rig, spec.start);
   const std::unique_ptr<hil::Clock> clock = make_clock(scenario, spec.start);
   hil::FrameLoop loop(spec, *clock, pointing, rig.chain(), sinks, link);
 

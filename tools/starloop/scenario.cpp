@@ -123,11 +123,15 @@ Scenario read_scenario(const ConfigReader& config) {
   s.detector = engine::read_detector(config.table("detector"), s.scene.camera.pixel_pitch_m,
                                      s.scene.sun.mean_wavelength_m);
   s.guidance = hil::read_guidance_error(config.table("guidance"));
+  s.mode = hil::read_guidance_mode(config.table("guidance"));
+  s.target_knowledge = hil::read_target_knowledge(config.table("guidance"));
   s.roll = config.table("guidance")
                .choice_or<hil::RollRule>("roll", "celestial",
                                          {{"celestial", hil::RollRule::kCelestial},
                                           {"vertical", hil::RollRule::kVertical}});
   s.actuator = hil::read_actuator(config.table("actuator"));
+  s.jitter = hil::read_jitter(config);
+  s.sensors = hil::read_sensors(config.table("sensors"));
   s.tracker = read_tracker(config.table("tracker"), s.scene.camera);
   config.reject_unknown_keys();
   return s;
@@ -146,6 +150,7 @@ Rig::Rig(const Scenario& scenario, int threads)
       roll_(scenario.roll),
       camera_(scenario.camera_orbit, epoch_),
       target_(scenario.target_orbit, epoch_),
+      believed_target_(target_, scenario.target_knowledge),
       pool_(worker_threads(threads)) {
   const engine::DetectorSpec& detector = scenario.detector;
   const double dark_e = detector.dark_e_s * engine::seconds(scenario.run.exposure);
@@ -170,6 +175,22 @@ Rig::Rig(const Scenario& scenario, int threads)
 }
 
 hil::ScriptedPointing Rig::prediction() const { return {camera_, target_, epoch_, path_, roll_}; }
+
+hil::ScriptedPointing Rig::believed() const {
+  return {camera_, believed_target_, epoch_, path_, roll_};
+}
+
+hil::ClosedLoopPointing make_pointing(const Scenario& scenario, const Rig& rig,
+                                      engine::SimTime start) {
+  hil::PointingSpec spec;
+  spec.mode = scenario.mode;
+  spec.error = scenario.guidance;
+  spec.error.start = start;
+  spec.actuator = scenario.actuator;
+  spec.sensors = scenario.sensors;
+  spec.seed = scenario.scene.seed;
+  return {rig.believed(), spec, hil::Jitter(scenario.jitter, spec.seed, start)};
+}
 
 std::vector<engine::Pass> passes_of(const Scenario& scenario) {
   const engine::Epoch epoch = scenario.scene.epoch;

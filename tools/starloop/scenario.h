@@ -52,8 +52,12 @@ struct Scenario {
   engine::OpticsSpec optics;
   engine::DetectorSpec detector;
   hil::GuidanceError guidance;
+  hil::GuidanceMode mode = hil::GuidanceMode::kPredictedTarget;
+  hil::TargetKnowledge target_knowledge;
   hil::RollRule roll = hil::RollRule::kCelestial;
   hil::ActuatorSpec actuator;
+  hil::JitterSpec jitter;
+  hil::SensorSpec sensors;
   tracker::TrackerSpec tracker;
 };
 
@@ -77,7 +81,10 @@ class Rig {
   Rig(const Scenario& scenario, int threads);
 
   [[nodiscard]] engine::ImagingChain& chain() noexcept { return *chain_; }
+  /// Without an error.
   [[nodiscard]] hil::ScriptedPointing prediction() const;
+  /// As far as the target's orbit is known.
+  [[nodiscard]] hil::ScriptedPointing believed() const;
   [[nodiscard]] const engine::KeplerPropagator& camera() const noexcept { return camera_; }
   [[nodiscard]] const engine::KeplerPropagator& target() const noexcept { return target_; }
   [[nodiscard]] int threads() const noexcept { return pool_.threads(); }
@@ -89,10 +96,15 @@ class Rig {
   hil::RollRule roll_;
   engine::KeplerPropagator camera_;
   engine::KeplerPropagator target_;
+  hil::BelievedTarget believed_target_;
   engine::WorkerPool pool_;
   std::size_t triangles_ = 0;
   std::unique_ptr<engine::ImagingChain> chain_;
 };
+
+/// The camera that obeys, in a run that starts at `start`. The rig outlives it.
+[[nodiscard]] hil::ClosedLoopPointing make_pointing(const Scenario& scenario, const Rig& rig,
+                                                    engine::SimTime start);
 
 [[nodiscard]] std::vector<engine::Pass> passes_of(const Scenario& scenario);
 
