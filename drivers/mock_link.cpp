@@ -14,7 +14,7 @@ using engine::Fault;
 using engine::Status;
 
 MockLink::MockLink(int width_px, int height_px) {
-  for (Slot& slot : slots_) slot.bytes.resize(frame_bytes(width_px, height_px));
+  for (Slot& slot : slots_) slot.bytes.resize(largest_frame_bytes(width_px, height_px));
 }
 
 Status MockLink::send(const hil::Frame& frame, Duration timeout) noexcept {

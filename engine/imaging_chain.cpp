@@ -4,6 +4,33 @@
 #include <cmath>
 
 namespace engine {
+namespace {
+
+struct LightSums {
+  double sum = 0;
+  double sum_u = 0;
+  double sum_v = 0;
+  double peak = 0;
+  void add(double light, int u, int v) noexcept {
+    sum += light;
+    sum_u += light * u;
+    sum_v += light * v;
+    peak = std::max(peak, light);
+  }
+};
+
+/// A run is a rectangle one row high; rows come from the top.
+void add_run(const PixelRect& run, FrameTruth& truth, TruthMask& mask) noexcept {
+  mask.add({static_cast<std::uint16_t>(run.top), static_cast<std::uint16_t>(run.left),
+            static_cast<std::uint16_t>(run.right)});
+  truth.mask_px += run.width();
+  PixelRect& box = truth.box;
+  box = box.empty() ? run
+                    : PixelRect{std::min(box.left, run.left), box.top,
+                                std::max(box.right, run.right), run.bottom};
+}
+
+}  // namespace
 
 ImagingChain::ImagingChain(const SnapshotBuilder& scene, std::unique_ptr<Renderer> renderer,
                            Optics optics, const Detector& detector,
@@ -43,6 +70,7 @@ FrameReport ImagingChain::expose(const Shot& shot, Budget budget, DnImage& out,
   truth.phase_angle_rad = snapshot.phase_angle_rad;
   truth.target_px = snapshot.target_px;
   truth.smear_px = std::hypot(snapshot.smear_px.u, snapshot.smear_px.v);
+  truth.visible_fraction = report.render.visible_fraction;
   truth.sun_irradiance_w_m2 = snapshot.sun.irradiance_w_m2;
   truth.earthshine_w_m2 = snapshot.earthshine.irradiance_w_m2;
   truth.earth_behind = snapshot.earth_behind;
@@ -56,25 +84,35 @@ FrameReport ImagingChain::expose(const Shot& shot, Budget budget, DnImage& out,
 void ImagingChain::measure_light(const PixelRect& window, Duration exposure, FrameTruth& truth,
                                  TruthMask& mask) const noexcept {
   mask.clear();
+  const double to_e = detector_spec_.electrons_per_irradiance(exposure);
   const double background = radiance_.uniform_w_m2_sr * optics_.throughput_sr();
-  double sum = 0;
-  double sum_u = 0;
-  double sum_v = 0;
-  double peak = 0;
+  const double noise_e =
+      detector_spec_.noise_e(background * to_e + detector_spec_.dark_e_s * seconds(exposure));
+  const double faint = noise_e / to_e;
+  LightSums all;
+  double in_mask = 0;
   for (int v = window.top; v < window.bottom; ++v) {
     const auto row = irradiance_.row(v);
+    int begin = -1;  // of the run that we are in
     for (int u = window.left; u < window.right; ++u) {
       const double light = static_cast<double>(row[static_cast<std::size_t>(u)]) - background;
-      sum += light;
-      sum_u += light * u;
-      sum_v += light * v;
-      peak = std::max(peak, light);
+      all.add(light, u, v);
+      if (light > faint) {
+        in_mask += light;
+        if (begin < 0) begin = u;
+      } else if (begin >= 0) {
+        add_run({begin, v, u, v + 1}, truth, mask);
+        begin = -1;
+      }
     }
+    if (begin >= 0) add_run({begin, v, window.right, v + 1}, truth, mask);
   }
-  const double to_e = detector_spec_.electrons_per_irradiance(exposure);
-  truth.peak_e = peak * to_e;
+  truth.peak_e = all.peak * to_e;
   // Less than one electron in the whole frame is no target: rounding of the transform, at most.
-  if (sum * to_e > 1.0) truth.photocentre_px = {sum_u / sum, sum_v / sum};
+  if (all.sum * to_e > 1.0) truth.photocentre_px = {all.sum_u / all.sum, all.sum_v / all.sum};
+  if (truth.mask_px == 0) return;
+  const double signal_e = in_mask * to_e;
+  truth.signal_to_noise = signal_e / std::sqrt(signal_e + truth.mask_px * noise_e * noise_e);
 }
 
 }  // namespace engine

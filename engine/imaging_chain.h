@@ -26,6 +26,8 @@ class ImagingChain final : public SceneGenerator {
   [[nodiscard]] Duration now() const noexcept {
     return stopwatch_ != nullptr ? stopwatch_() : Duration{};
   }
+  /// What is known of the target's light once it has been blurred: truth from peak_e to
+  /// signal_to_noise, and the photocentre.
   void measure_light(const PixelRect& window, Duration exposure, FrameTruth& truth,
                      TruthMask& mask) const noexcept;
 

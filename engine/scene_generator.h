@@ -26,17 +26,18 @@ struct FrameTruth {
   double smear_px = 0;
   double peak_e = 0;  ///< of the target's light
   PixelRect box;      ///< around the mask; empty when the mask is
-  int mask_px = 0;    ///< pixels of the mask
-  /// Of all the mask's light against its shot noise and the sensor's own; 0 without a mask.
+  int mask_px = 0;    ///< pixels of the mask, of those too that it had no room for
+  /// Of all the mask's light against its shot noise and the dark pixels' own; 0 without a mask.
   double signal_to_noise = 0;
-  double visible_fraction = 0;  ///< of the target's outline that lies in the frame, in [0, 1]
+  double visible_fraction = 0;  ///< RenderReport's: of the target, in the frame, lit or not
   double sun_irradiance_w_m2 = 0;
   double earthshine_w_m2 = 0;
   bool earth_behind = false;
   bool roll_is_fallback = false;
 };
 
-/// The pixels where the target's light is above one sigma of a dark pixel's noise, as runs of
+/// The pixels where the target's light, free of noise, is above one sigma of a dark pixel's noise:
+/// one that sees the even background only. As runs of
 /// columns [begin, end), row by row from the top. Adding never allocates; what is too much is lost,
 /// and the mask says so.
 class TruthMask {
@@ -58,6 +59,12 @@ class TruthMask {
     } else {
       truncated_ = true;
     }
+  }
+  /// As far as there is room.
+  void copy(const TruthMask& other) noexcept {
+    clear();
+    for (const Run& run : other.runs()) add(run);
+    truncated_ = truncated_ || other.truncated_;
   }
   [[nodiscard]] std::span<const Run> runs() const noexcept { return runs_; }
   [[nodiscard]] bool truncated() const noexcept { return truncated_; }

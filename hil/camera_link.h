@@ -9,6 +9,7 @@
 #include "engine/core/image.h"
 #include "engine/core/time.h"
 #include "engine/scene_generator.h"
+#include "hil/refusal.h"
 
 namespace hil {
 
@@ -29,6 +30,7 @@ struct LoopCounts {
   std::uint64_t dropped = 0;
   std::uint64_t late = 0;
   std::uint64_t commands = 0;  ///< obeyed
+  RefusalCounts refused{};     ///< by the command gate
 };
 
 /// What leaves the camera head: pixels, and what a camera knows about itself.

@@ -1,43 +1,203 @@
 #include "hil/closed_loop_pointing.h"
 
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "hil/turn.h"
+
 namespace hil {
 
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
 using engine::CameraAttitude;
+using engine::Duration;
+using engine::kPi;
 using engine::SimTime;
 
-GuidanceError read_guidance_error(const engine::ConfigTable& table) {
-  const engine::Range angle = engine::between(-1e5, 1e5);
-  GuidanceError error;
-  error.offset_rad = {table.number_or("error_x_urad", 0.0, angle) * 1e-6,
-                      table.number_or("error_y_urad", 0.0, angle) * 1e-6};
-  error.growth_rad_s = {table.number_or("error_growth_x_urad_s", 0.0, angle) * 1e-6,
-                        table.number_or("error_growth_y_urad_s", 0.0, angle) * 1e-6};
-  return error;
+namespace {
+
+constexpr std::size_t kMostUnderWay = 1024;
+constexpr double kFastest_rad_s = 2.0 * kPi;
+constexpr Duration kInstant{1'000'000};  // over which rates are carried from line to line
+
+/// Tilting the boresight by x towards u and y towards v is a turn about -y and x.
+Vector3d turn_towards(double x_rad, double y_rad, double roll_rad) noexcept {
+  return {-y_rad, x_rad, roll_rad};
 }
 
+template <class Numbers>
+bool finite(const Numbers& numbers) noexcept {
+  return std::all_of(numbers.begin(), numbers.end(), [](double x) { return std::isfinite(x); });
+}
+
+bool can_be_obeyed(const Command& c) noexcept {
+  switch (c.kind) {
+    case CommandKind::kTrim:
+      return finite(c.trim_offset_rad) && finite(c.trim_rate_rad_s);
+    case CommandKind::kRate:
+      return finite(c.trim_rate_rad_s) &&
+             std::hypot(c.trim_rate_rad_s[0], c.trim_rate_rad_s[1]) <= kFastest_rad_s;
+    case CommandKind::kAttitude: {
+      const Quaternion& q = c.attitude.j2000_to_camera;
+      const auto& rate = c.attitude.rate_rad_s;
+      const double length = std::hypot(std::hypot(q[0], q[1]), std::hypot(q[2], q[3]));
+      return finite(q) && finite(rate) && length > 0.5 && length < 2.0 &&
+             std::hypot(rate[0], rate[1], rate[2]) <= kFastest_rad_s;
+    }
+    case CommandKind::kMode:
+      return static_cast<int>(c.mode) < kGuidanceModes;
+    case CommandKind::kReport:
+    case CommandKind::kPing:
+    case CommandKind::kTrigger:
+      break;
+  }
+  return true;
+}
+
+}  // namespace
+
+ClosedLoopPointing::ClosedLoopPointing(const ScriptedPointing& prediction, const PointingSpec& spec,
+                                       Jitter jitter)
+    : guidance_(prediction, spec.error),
+      first_mode_(spec.mode),
+      axes_{Actuator(spec.actuator, 0), Actuator(spec.actuator, 1), Actuator(spec.actuator, 2)},
+      delay_(spec.actuator.delay),
+      sensors_(spec.sensors, spec.seed),
+      jitter_(std::move(jitter)),
+      under_way_(kMostUnderWay) {}
+
+ClosedLoopPointing::ClosedLoopPointing(const ScriptedPointing& prediction,
+                                       const GuidanceError& error, const ActuatorSpec& actuator)
+    : ClosedLoopPointing(prediction, PointingSpec{.error = error, .actuator = actuator}) {}
+
 CameraAttitude ClosedLoopPointing::attitude(SimTime t) noexcept {
-  std::array<double, 2> off{};
-  for (std::size_t i = 0; i < 2; ++i) {
-    axes_[i].advance_to(t);
-    off[i] = error_.offset_rad[i] + error_.growth_rad_s[i] * engine::seconds(t - error_.start) +
-             axes_[i].angle_rad();
+  const bool first = !begun_;
+  const SimTime before = now_;
+  if (first) begin(t);
+  while (under_way_.has_due(t)) {
+    const auto [due, order] = under_way_.pop();
+    advance_to(std::max(due, now_));
+    obey(order);
   }
-  CameraAttitude attitude = prediction_.attitude(t);
-  // Tilt the boresight by off[0] towards x and off[1] towards y: one turn about the axis across.
-  const double angle = std::hypot(off[0], off[1]);
-  if (angle > 0.0) {
-    const Eigen::Vector3d axis(-off[1] / angle, off[0] / angle, 0.0);
-    // Passive: the axes turn, so the matrix is that of the opposite turn.
-    attitude.axes.matrix =
-        Eigen::AngleAxisd(-angle, axis).toRotationMatrix() * attitude.axes.matrix;
-  }
+  advance_to(t);
+  history_.add(t, trim_rad());
+
+  CameraAttitude attitude = guidance_.line(t);
+  Matrix3d& axes = attitude.axes.matrix;
+  const TrimAngles shaken = jitter_.at(t);
+  const Vector3d turn = turn_rad();
+  const Vector3d unseen = turn_towards(shaken[0] + axes_[0].unseen_rad(),
+                                       shaken[1] + axes_[1].unseen_rad(), axes_[2].unseen_rad());
+  if (!turn.isZero(0.0)) axes = axes_turned(turn) * axes;
+  if (!unseen.isZero(0.0)) axes = axes_turned(unseen) * axes;
+  if (!first && t > before)
+    last_rate_rad_s_ = turn_of(axes * last_axes_.transpose()) / engine::seconds(t - before);
+  last_axes_ = axes;
   return attitude;
 }
 
-void ClosedLoopPointing::apply(const Command& command) noexcept {
-  if (command.kind != CommandKind::kTrim) return;
-  for (std::size_t i = 0; i < 2; ++i)
-    axes_[i].follow(command.trim_offset_rad[i], command.trim_rate_rad_s[i], command.reference);
+void ClosedLoopPointing::begin(SimTime t) noexcept {
+  begun_ = true;
+  now_ = t;
+  for (Actuator& axis : axes_) axis.advance_to(t);
+  guidance_.set_mode(first_mode_, guidance_.line(t).axes.matrix);
+}
+
+void ClosedLoopPointing::advance_to(SimTime t) noexcept {
+  for (Actuator& axis : axes_) axis.advance_to(t);
+  now_ = t;
+  turn_the_short_way();
+}
+
+void ClosedLoopPointing::apply(const Command& c) noexcept {
+  if (c.kind == CommandKind::kReport || c.kind == CommandKind::kPing ||
+      c.kind == CommandKind::kTrigger)
+    return;
+  if (!can_be_obeyed(c)) {
+    ++refused_;
+    return;
+  }
+  const Order order{c.kind, c.trim_offset_rad, c.trim_rate_rad_s, c.reference, c.attitude, c.mode};
+  if (begun_ && delay_ == Duration{}) {
+    obey(order);
+  } else if (!under_way_.push(order, begun_ ? now_ + delay_ : SimTime::min())) {
+    ++refused_;
+  }
+}
+
+void ClosedLoopPointing::obey(const Order& order) noexcept {
+  switch (order.kind) {
+    case CommandKind::kTrim:
+      for (std::size_t i = 0; i < 2; ++i)
+        axes_[i].follow(order.offset_rad[i], order.rate_rad_s[i], order.reference);
+      break;
+    case CommandKind::kRate: {
+      history_.add(now_, trim_rad());
+      const TrimAngles from = history_.at(order.reference);
+      for (std::size_t i = 0; i < 2; ++i)
+        axes_[i].turn_from(from[i], order.rate_rad_s[i], order.reference);
+      break;
+    }
+    case CommandKind::kAttitude:
+      change_line([&](const Matrix3d&) { guidance_.command(order.attitude, order.reference); });
+      break;
+    case CommandKind::kMode:
+      change_line([&](const Matrix3d& held) { guidance_.set_mode(order.mode, held); });
+      break;
+    case CommandKind::kReport:
+    case CommandKind::kPing:
+    case CommandKind::kTrigger:
+      break;
+  }
+}
+
+template <class Set>
+void ClosedLoopPointing::change_line(Set set) noexcept {
+  const SimTime soon = now_ + kInstant;
+  const double instant_s = engine::seconds(kInstant);
+  const Matrix3d held = axes_turned(turn_rad()) * guidance_.line(now_).axes.matrix;
+  const Matrix3d held_soon =
+      axes_turned(turn_rad() + instant_s * turn_rate_rad_s()) * guidance_.line(soon).axes.matrix;
+  set(held);
+  const Vector3d turn = turn_of(held * guidance_.line(now_).axes.matrix.transpose());
+  const Vector3d turn_soon =
+      turn_near(turn_of(held_soon * guidance_.line(soon).axes.matrix.transpose()), turn);
+  place(turn, (turn_soon - turn) / instant_s);
+  for (Actuator& axis : axes_) axis.follow(0.0, 0.0, now_);
+  history_.clear();
+}
+
+/// A camera that is turned on and on away from its line comes back the short way.
+void ClosedLoopPointing::turn_the_short_way() noexcept {
+  const Vector3d turn = turn_rad();
+  const double angle = turn.norm();
+  // Not from pi on: after half a turn either way is as short, and it must not waver.
+  if (angle < 1.5 * kPi) return;
+  const Vector3d axis = turn / angle;
+  const double less = std::remainder(angle, 2.0 * kPi);
+  const Vector3d rate = turn_rate_rad_s();
+  const Vector3d along = rate.dot(axis) * axis;
+  place(less * axis, along + less / angle * (rate - along));
+  history_.clear();
+}
+
+Vector3d ClosedLoopPointing::turn_rad() const noexcept {
+  return turn_towards(axes_[0].angle_rad(), axes_[1].angle_rad(), axes_[2].angle_rad());
+}
+
+Vector3d ClosedLoopPointing::turn_rate_rad_s() const noexcept {
+  return turn_towards(axes_[0].rate_rad_s(), axes_[1].rate_rad_s(), axes_[2].rate_rad_s());
+}
+
+void ClosedLoopPointing::place(const Vector3d& turn, const Vector3d& rate) noexcept {
+  axes_[0].place(turn.y(), rate.y());
+  axes_[1].place(-turn.x(), -rate.x());
+  axes_[2].place(turn.z(), rate.z());
+}
+
+MeasuredAttitude ClosedLoopPointing::measured() const noexcept {
+  return sensors_.read(last_axes_, last_rate_rad_s_, now_);
 }
 
 }  // namespace hil

@@ -4,6 +4,7 @@
 #include <thread>
 #include <utility>
 
+#include "hil/decisions.h"
 #include "hil/realtime.h"
 #include "hil/steady_clock.h"
 
@@ -59,6 +60,7 @@ LoopReport FrameLoop::run(const std::stop_token& stop) {
   report.faults = sender_counts_.faults;
   report.last_fault = sender_counts_.last_fault;
   report.command_faults = receiver_counts_.command_faults;
+  report.refused = gate_.refused();
   report.commands_lost += receiver_counts_.commands_lost;
   return report;
 }
@@ -75,14 +77,16 @@ bool FrameLoop::run_frame(std::uint64_t k, const std::stop_token& stop, LoopRepo
   wait_for_shutter(in_time, record, report);
   std::size_t slot = 0;
   record.handed_over = acquire_slot(stop, slot);
-  counts_ = {report.skipped, report.dropped, report.late, report.commands};
+  counts_ = {report.skipped, report.dropped, report.late, report.commands, {}};
+  for (std::size_t i = 0; i < kRefusals; ++i)
+    counts_.refused.by_cause[i] = refused_now_[i].load(std::memory_order_relaxed);
   if (record.handed_over) {
     expose(k, slot, record);
   } else {
     ++report.dropped;
   }
   if (!frames_.push(record)) ++report.records_lost;
-  return !record.handed_over || spec_.answer_timeout <= Duration{} ||
+  return !record.handed_over || spec_.answer_timeout <= Duration{} || spec_.replay != nullptr ||
          wait_for_answer(k, stop, report);
 }
 
@@ -95,30 +99,44 @@ bool FrameLoop::wait_for_trigger(const std::stop_token& stop, LoopReport& report
 void FrameLoop::wait_for_shutter(bool in_time, FrameRecord& record, LoopReport& report) noexcept {
   record.late = clock_.sleep_until(record.shutter_open);
   const Duration woke = SteadyClock::stopwatch();
-  if (spec_.hiccups != nullptr)
-    for (Hiccup h; spec_.hiccups->next(h);) hiccups_.add(h);
   if (record.late > kLateLimit) ++report.late;
   const Duration delay =
       record.late + spec_.period * static_cast<std::int64_t>(record.skipped_before);
-  if (delay > kLateLimit) {
-    // A loop that was at work lost its time anywhere since the frame before; one that slept, now.
-    const Duration from = in_time ? woke - delay : woke - delay - spec_.period;
-    record.late_cause = late_cause(delay, in_time, hiccups_.within(from, woke));
-  }
+  // A loop that was at work lost its time anywhere since the frame before; one that slept, now.
+  const Duration from = in_time ? woke - delay : woke - delay - spec_.period;
+  const Duration held = held_up(from, woke);
+  if (delay > kLateLimit) record.late_cause = late_cause(delay, in_time, held);
   ++report.late_by_cause[static_cast<std::size_t>(record.late_cause)];
+}
+
+/// How long the machine kept the meter from waking between the two.
+Duration FrameLoop::held_up(Duration from, Duration to) noexcept {
+  if (spec_.hiccups == nullptr) return {};
+  // What began a stall may end it for us before it does for the meter, which then tells too late.
+  const Duration due = std::clamp(spec_.hiccups->due(), from, to);
+  for (Hiccup h; spec_.hiccups->next(h);) hiccups_.add(h);
+  return hiccups_.within(from, due) + (to - due);
 }
 
 /// The first frame from `k` on whose shutter can still open on time.
 std::uint64_t FrameLoop::skip_missed(std::uint64_t k, LoopReport& report) noexcept {
-  const Duration behind = clock_.now() - opening(k);
-  if (behind <= kLateLimit) return k;
-  const auto periods =
-      static_cast<std::uint64_t>((behind + spec_.period - Duration(1)) / spec_.period);
+  std::uint64_t periods = 0;
+  if (spec_.replay != nullptr) {
+    periods = next_due(k) - k;
+  } else if (const Duration behind = clock_.now() - opening(k); behind > kLateLimit) {
+    periods = static_cast<std::uint64_t>((behind + spec_.period - Duration(1)) / spec_.period);
+  }
   const std::uint64_t skipped = std::min(periods, spec_.frames - k);
   report.due += skipped;
   report.skipped += skipped;
   skipped_before_ += skipped;
   return k + skipped;
+}
+
+std::uint64_t FrameLoop::next_due(std::uint64_t k) noexcept {
+  const auto& due = spec_.replay->due;
+  while (next_due_ < due.size() && due[next_due_].frame < k) ++next_due_;
+  return next_due_ < due.size() ? due[next_due_].frame : spec_.frames;
 }
 
 void FrameLoop::take_command(const Command& command, std::uint64_t k, LoopReport& report) noexcept {
@@ -134,13 +152,21 @@ void FrameLoop::obey(std::uint64_t k, LoopReport& report) noexcept {
     // Up to here the commands before this slot hold.
     static_cast<void>(pointing_.attitude(slot));
   }
+  if (spec_.replay != nullptr) {
+    const auto& commands = spec_.replay->commands;
+    const auto now = [&] { return k >= spec_.frames || commands[next_command_].frame <= k; };
+    for (; next_command_ < commands.size() && now(); ++next_command_)
+      take_command(commands[next_command_].command, k, report);
+    return;
+  }
   for (const Command& command : waiting_) take_command(command, k, report);
   waiting_.clear();
   for (Command command; received_.pop(command);) take_command(command, k, report);
 }
 
 bool FrameLoop::acquire_slot(const std::stop_token& stop, std::size_t& slot) noexcept {
-  if (spec_.when_busy == WhenBusy::kDropFrame) {
+  if (spec_.replay != nullptr && !spec_.replay->due[next_due_].exposed) return false;
+  if (spec_.when_busy == WhenBusy::kDropFrame && spec_.replay == nullptr) {
     if (!free_count_.try_acquire()) return false;
   } else {
     while (!free_count_.try_acquire_for(kPatience))
@@ -226,20 +252,31 @@ void FrameLoop::receive_commands(const std::stop_token& stop) noexcept {
   if (spec_.service_priority > 0) static_cast<void>(raise_priority(spec_.service_priority));
   while (!stop.stop_requested()) {
     const engine::Expected<Command> command = source_.receive(kPatience);
-    if (command.ok() && command.value().kind == CommandKind::kTrigger) {
-      if (spec_.trigger != nullptr) spec_.trigger->pull();
-    } else if (command.ok()) {
-      if (received_.push(command.value())) {
-        received_count_.release();
-      } else {
-        ++receiver_counts_.commands_lost;
-      }
+    if (command.ok()) {
+      take_received(command.value());
     } else if (command.error().fault == engine::Fault::kDisconnected) {
       // Nobody is there: look again later, without eating a core.
       std::this_thread::sleep_for(kPatience / 10);
     } else if (command.error().fault != engine::Fault::kTimeout) {
       ++receiver_counts_.command_faults;
     }
+  }
+}
+
+void FrameLoop::take_received(Command command) noexcept {
+  if (const auto refusal = gate_.admit(command, clock_.now())) {
+    refused_now_[static_cast<std::size_t>(*refusal)].fetch_add(1, std::memory_order_relaxed);
+    return;
+  }
+  if (command.kind == CommandKind::kTrigger) {
+    if (spec_.trigger != nullptr) spec_.trigger->pull();
+    return;
+  }
+  if (spec_.open_loop) command.kind = CommandKind::kReport;
+  if (received_.push(command)) {
+    received_count_.release();
+  } else {
+    ++receiver_counts_.commands_lost;
   }
 }
 

@@ -1,12 +1,14 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <semaphore>
 #include <stop_token>
 #include <vector>
 
 #include "engine/scene_generator.h"
 #include "hil/clock.h"
+#include "hil/command_gate.h"
 #include "hil/hiccup_meter.h"
 #include "hil/pointing_source.h"
 #include "hil/spsc_ring.h"
@@ -16,6 +18,8 @@ namespace hil {
 
 /// When the link still holds every slot: the rig must keep time, a rehearsal must keep every frame.
 enum class WhenBusy : std::uint8_t { kDropFrame, kWait };
+
+struct Decisions;
 
 struct LoopSpec {
   engine::SimTime start{};
@@ -34,7 +38,12 @@ struct LoopSpec {
   Trigger* trigger = nullptr;
   engine::Duration trigger_timeout{};
   HiccupMeter* hiccups = nullptr;  ///< if given, says which delays are the machine's
+  bool open_loop = false;          ///< commands count as reports: nothing of them is obeyed
   int service_priority = 0;        ///< SCHED_FIFO of sender and receiver; 0: ordinary
+  /// A replay: which frames are skipped, dropped and exposed, and which commands are obeyed when,
+  /// is what these say; neither the clock nor the link nor a command source decides. Outlives the
+  /// loop.
+  const Decisions* replay = nullptr;
   int width_px = 1024;
   int height_px = 1024;
   int bits = 11;
@@ -73,6 +82,7 @@ struct LoopReport {
   std::array<std::uint64_t, kLateCauses> late_by_cause{};
   std::uint64_t commands = 0;        ///< obeyed
   std::uint64_t command_faults = 0;  ///< packets that were none
+  RefusalCounts refused;             ///< commands that the gate turned away, by cause
   std::uint64_t commands_lost = 0;   ///< came faster than a slot could take them
   std::uint64_t records_lost = 0;    ///< the observer was too slow; the frame itself was not
   bool answer_missing = false;       ///< lockstep ended because no answer came
@@ -116,7 +126,10 @@ class FrameLoop {
   /// Sleeps until the shutter opens, and finds out why it opens late when it does. `in_time`: the
   /// work before was done.
   void wait_for_shutter(bool in_time, FrameRecord& record, LoopReport& report) noexcept;
+  [[nodiscard]] engine::Duration held_up(engine::Duration from, engine::Duration to) noexcept;
   [[nodiscard]] std::uint64_t skip_missed(std::uint64_t k, LoopReport& report) noexcept;
+  /// The same in a replay.
+  [[nodiscard]] std::uint64_t next_due(std::uint64_t k) noexcept;
   [[nodiscard]] bool acquire_slot(const std::stop_token& stop, std::size_t& slot) noexcept;
   void obey(std::uint64_t k, LoopReport& report) noexcept;
   void expose(std::uint64_t k, std::size_t slot, FrameRecord& record) noexcept;
@@ -126,6 +139,7 @@ class FrameLoop {
   void take_command(const Command& command, std::uint64_t k, LoopReport& report) noexcept;
   void send_frames(const std::stop_token& stop) noexcept;
   void receive_commands(const std::stop_token& stop) noexcept;
+  void take_received(Command command) noexcept;
 
   LoopSpec spec_;
   Clock& clock_;
@@ -143,13 +157,17 @@ class FrameLoop {
   std::counting_semaphore<> received_count_{0};
 
   std::vector<Command> waiting_;  // taken, not yet obeyed; the loop's own
+  std::size_t next_due_ = 0;      // of a replay's decisions
+  std::size_t next_command_ = 0;  // of a replay's decisions
   std::uint64_t skipped_before_ = 0;
   LoopCounts counts_;
   HiccupHistory hiccups_;
   LoopReport sender_counts_;    // the sender's own until it is joined
   LoopReport receiver_counts_;  // the receiver's own until it is joined
-  FrameRing frames_;            // loop -> observer
-  CommandRing applied_;         // loop -> observer
+  CommandGate gate_;            // the receiver's own until it is joined
+  std::array<std::atomic<std::uint64_t>, kRefusals> refused_now_{};  // receiver -> loop
+  FrameRing frames_;                                                 // loop -> observer
+  CommandRing applied_;                                              // loop -> observer
 };
 
 }  // namespace hil

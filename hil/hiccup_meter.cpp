@@ -50,7 +50,8 @@ LateCause late_cause(Duration delay, bool in_time, Duration held_up) noexcept {
 }
 
 HiccupMeter::HiccupMeter(int priority)
-    : thread_([this, priority](const std::stop_token& stop) { measure(stop, priority); }) {}
+    : due_(SteadyClock::stopwatch()),
+      thread_([this, priority](const std::stop_token& stop) { measure(stop, priority); }) {}
 
 const WakeHistogram& HiccupMeter::finish() {
   thread_.request_stop();
@@ -63,6 +64,7 @@ void HiccupMeter::measure(const std::stop_token& stop, int priority) noexcept {
   Duration due = SteadyClock::stopwatch();
   while (!stop.stop_requested()) {
     due += kPeriod;
+    due_.store(due, std::memory_order_release);
     SteadyClock::sleep_until_stopwatch(due);
     const Duration woke = SteadyClock::stopwatch();
     wakes_.add(woke - due);

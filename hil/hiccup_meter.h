@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <cstdint>
 #include <thread>
 
@@ -79,15 +80,20 @@ class HiccupMeter {
 
   /// Thread: loop.
   [[nodiscard]] bool next(Hiccup& h) noexcept { return told_.pop(h); }
+  /// When the thread wants to wake, or wanted to and has not yet told. Thread: loop.
+  [[nodiscard]] engine::Duration due() const noexcept {
+    return due_.load(std::memory_order_acquire);
+  }
   /// Ends the thread. Thread: the one that made it.
   const WakeHistogram& finish();
 
  private:
   void measure(const std::stop_token& stop, int priority) noexcept;
 
-  SpscRing<Hiccup, 1024> told_;  // meter -> loop
-  WakeHistogram wakes_;          // the meter's own until it is joined
-  std::jthread thread_;          // the last member: it uses the others
+  SpscRing<Hiccup, 1024> told_;        // meter -> loop
+  std::atomic<engine::Duration> due_;  // meter -> loop
+  WakeHistogram wakes_;                // the meter's own until it is joined
+  std::jthread thread_;                // the last member: it uses the others
 };
 
 }  // namespace hil

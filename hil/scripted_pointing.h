@@ -27,6 +27,10 @@ class ScriptedPointing final : public PointingSource {
     return engine::look_along(line.apparent,
                               engine::direction_of<engine::J2000>(line.camera.position.m));
   }
+  /// Nadir: boresight to the Earth's centre, by geometry; x along the track.
+  [[nodiscard]] engine::CameraAttitude nadir(engine::SimTime t) const noexcept {
+    return {{engine::orbital_frame(camera_.at(epoch_ + t.time_since_epoch())).matrix}, false};
+  }
   void apply(const Command& /*command*/) noexcept override {}
   [[nodiscard]] TrimAngles trim_rad() const noexcept override { return {}; }
 

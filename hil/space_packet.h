@@ -5,6 +5,7 @@
 #include <span>
 
 #include "hil/camera_link.h"
+#include "hil/packet_auth.h"
 
 namespace hil {
 
@@ -28,7 +29,6 @@ namespace hil {
 /// Times are simulated nanoseconds after the scenario's epoch.
 inline constexpr std::size_t kPrimaryHeaderBytes = 6;
 inline constexpr std::size_t kCommandHeaderBytes = 68;
-inline constexpr std::size_t kSignatureBytes = 32;
 inline constexpr std::size_t kChecksumBytes = 4;
 inline constexpr std::size_t kLargestCommandBytes =
     kCommandHeaderBytes + 64 + kSignatureBytes + kChecksumBytes;
@@ -47,12 +47,25 @@ struct CommandPacket {
 /// Unsigned; Command::sender stays at home.
 [[nodiscard]] CommandPacket encode_command(const Command& command) noexcept;
 
-/// kRejected for anything that is not exactly one whole unsigned command: length, version, type,
-/// APID, protocol, checksum, or a number that is not finite or out of its range. A quaternion comes
-/// back with length one; one shorter than 0.5 or longer than 2 is refused.
-[[nodiscard]] engine::Expected<Command> decode_command(std::span<const std::byte> in) noexcept;
+/// Adds the signature. Pre: it comes fresh from encode_command().
+void sign(CommandPacket& packet, const PacketKey& key) noexcept;
+
+/// What a packet failed at, in the order in which it is looked at.
+enum class PacketFault : std::uint8_t { kMalformed, kChecksum, kUnsigned, kSignature, kValue };
+
+/// Without a key only unsigned packets are commands; with one, only packets that it signed.
+/// kRejected for anything that is not exactly one whole such command: length, version, type, APID,
+/// protocol, checksum, signature, or a number that is not finite or out of its range; error().code
+/// is then a PacketFault. A quaternion comes back with length one; one shorter than 0.5 or longer
+/// than 2 is refused.
+[[nodiscard]] engine::Expected<Command> decode_command(std::span<const std::byte> in,
+                                                       const PacketKey* key = nullptr) noexcept;
 
 /// How long the packet that starts here says it is: for streams. Pre: at least 6 bytes.
 [[nodiscard]] std::size_t packet_bytes(std::span<const std::byte> in) noexcept;
+
+/// Whether a command can begin like this; false: a stream has lost its place, or never had one.
+/// Pre: at least 6 bytes.
+[[nodiscard]] bool may_be_command(std::span<const std::byte> in) noexcept;
 
 }  // namespace hil

@@ -30,6 +30,7 @@ OWNERS = [
     ("fftw3", {"optics"}),
     ("asio", {"hil"}),
     ("boost/asio", {"hil"}),
+    ("openssl/", {"hil"}),
     ("libusb", {"drivers"}),
     ("linux/videodev2", {"drivers"}),
     ("opencv2/", {"tools"}),

@@ -8,6 +8,7 @@ packages=(
   # libraries that the program links
   libembree-dev libopencv-dev libeigen3-dev libtomlplusplus-dev libcli11-dev libspdlog-dev
   liberfa-dev libcfitsio-dev librandom123-dev libtinyobjloader-dev nlohmann-json3-dev
+  libasio-dev libssl-dev
   # tests, benchmarks, pictures
   libgtest-dev libbenchmark-dev python3 python3-matplotlib python3-numpy
 )

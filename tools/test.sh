@@ -20,11 +20,11 @@ export ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=print_stacktrace=1
 
 if [[ "$full" == yes ]]; then
   tools/setup.sh --full
-  git ls-files '*.h' '*.cpp' | xargs clang-format --dry-run --Werror
+  git ls-files '*.h' '*.c' '*.cpp' | xargs clang-format --dry-run --Werror
   build debug
   ctest --preset debug -j "$jobs" -LE long
   build tsan
-  ctest --preset tsan -j "$jobs" -R 'FrameLoop|SpscRing|WorkerPool|MockLink|ImagingChain|Tracker'
+  ctest --preset tsan -j "$jobs" -R 'FrameLoop|SpscRing|WorkerPool|MockLink|Shm|ImagingChain|Tracker'
   build asan
   ctest --preset asan -j "$jobs"
 else

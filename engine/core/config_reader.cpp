@@ -44,6 +44,19 @@ std::string Range::text() const {
   return out.empty() ? "a number" : out;
 }
 
+std::string scenario_text(const std::string& path) {
+  std::FILE* file = std::fopen(path.c_str(), "rb");
+  if (file == nullptr) throw ConfigError(path + ": expected a scenario file, found none to read");
+  std::string text;
+  char buffer[4096];
+  for (std::size_t n = 0; (n = std::fread(buffer, 1, sizeof buffer, file)) > 0;)
+    text.append(buffer, n);
+  const bool broken = std::ferror(file) != 0;
+  std::fclose(file);
+  if (broken) throw ConfigError(path + ": expected a scenario file, found one that cannot be read");
+  return text;
+}
+
 struct ConfigReader::Document {
   std::string name;
   toml::table root;
@@ -92,16 +105,7 @@ ConfigReader ConfigReader::from_text(std::string_view text, const std::string& n
 }
 
 ConfigReader ConfigReader::from_file(const std::string& path) {
-  std::FILE* file = std::fopen(path.c_str(), "rb");
-  if (file == nullptr) throw ConfigError(path + ": expected a scenario file, found none to read");
-  std::string text;
-  char buffer[4096];
-  for (std::size_t n = 0; (n = std::fread(buffer, 1, sizeof buffer, file)) > 0;)
-    text.append(buffer, n);
-  const bool broken = std::ferror(file) != 0;
-  std::fclose(file);
-  if (broken) throw ConfigError(path + ": expected a scenario file, found one that cannot be read");
-  return from_text(text, path);
+  return from_text(scenario_text(path), path);
 }
 
 void ConfigReader::set(const std::string& assignment) {
@@ -206,6 +210,13 @@ std::string ConfigTable::text(const std::string& key) const {
 
 std::string ConfigTable::text_or(const std::string& key, const std::string& fallback) const {
   return has(key) ? text(key) : fallback;
+}
+
+bool ConfigTable::flag_or(const std::string& key, bool fallback) const {
+  if (!has(key)) return fallback;
+  const toml::node* node = document_->find(path(key));
+  if (!node->is_boolean()) fail(key, "must be true or false, got " + kind_text(*node));
+  return node->as_boolean()->get();
 }
 
 bool ConfigTable::is_text(const std::string& key) const {

@@ -48,6 +48,9 @@ struct Range {
 
 class ConfigTable;
 
+/// The bytes of a scenario file. Throws ConfigError.
+[[nodiscard]] std::string scenario_text(const std::string& path);
+
 /// A scenario: TOML text, and the line that each value stands on.
 ///
 /// Every value is asked for by name and checked there; what nobody asked for is an unknown key, and
@@ -91,6 +94,7 @@ class ConfigTable {
                                         const Range& range) const;
   [[nodiscard]] std::string text(const std::string& key) const;
   [[nodiscard]] std::string text_or(const std::string& key, const std::string& fallback) const;
+  [[nodiscard]] bool flag_or(const std::string& key, bool fallback) const;  ///< true or false
   [[nodiscard]] bool is_text(const std::string& key) const;
 
   template <class Value>

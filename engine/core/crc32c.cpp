@@ -30,8 +30,8 @@ constexpr Table kTable = make_table();
 
 }  // namespace
 
-std::uint32_t crc32c(std::span<const std::byte> bytes) noexcept {
-  std::uint32_t c = 0xFFFFFFFFU;
+std::uint32_t crc32c(std::span<const std::byte> bytes, std::uint32_t so_far) noexcept {
+  std::uint32_t c = ~so_far;
   while (bytes.size() >= 8) {
     std::uint64_t word = 0;
     std::memcpy(&word, bytes.data(), 8);

@@ -44,6 +44,14 @@ void write_card(fitsfile* file, const FitsCard& card, int& status) {
   }
 }
 
+constexpr const char* kPixelOrder =
+    "Pixel (1, 1) here is pixel (0, 0) of the camera, first row on top.";
+
+void put_in_place(const std::string& part, const std::string& path) {
+  if (std::rename(part.c_str(), path.c_str()) != 0)
+    throw std::runtime_error(path + ": the finished file could not be put in place");
+}
+
 }  // namespace
 
 void write_fits(const std::string& path, const DnImage& image, const std::vector<FitsCard>& cards) {
@@ -56,16 +64,93 @@ void write_fits(const std::string& path, const DnImage& image, const std::vector
   long size[2] = {image.width(), image.height()};
   fits_create_img(out.file, USHORT_IMG, 2, size, &status);
   for (const FitsCard& card : cards) write_card(out.file, card, status);
-  fits_write_comment(out.file, "Pixel (1, 1) here is pixel (0, 0) of the camera, first row on top.",
-                     &status);
+  fits_write_comment(out.file, kPixelOrder, &status);
   const auto pixels = image.pixels();
   // cfitsio takes a pointer to non-const and does not write through it.
   fits_write_img(out.file, TUSHORT, 1, static_cast<LONGLONG>(pixels.size()),
                  const_cast<std::uint16_t*>(pixels.data()), &status);
   check(status, path);
   out.close(path);
-  if (std::rename(part.c_str(), path.c_str()) != 0)
-    throw std::runtime_error(path + ": the finished file could not be put in place");
+  put_in_place(part, path);
+}
+
+struct FitsCube::Open : FitsFile {};
+
+FitsCube::FitsCube(std::string path, int width, int height, const std::vector<FitsCard>& cards)
+    : path_(std::move(path)), width_(width), height_(height), open_(std::make_unique<Open>()) {
+  const std::string part = path_ + ".part";
+  std::remove(part.c_str());
+  int status = 0;
+  fits_create_diskfile(&open_->file, part.c_str(), &status);
+  long size[3] = {width, height, 1};
+  fits_create_img(open_->file, USHORT_IMG, 3, size, &status);
+  for (const FitsCard& card : cards) write_card(open_->file, card, status);
+  fits_write_comment(open_->file, kPixelOrder, &status);
+  check(status, path_);
+}
+
+FitsCube::~FitsCube() = default;
+
+void FitsCube::add(const DnImage& image, const std::vector<FitsCard>& row) {
+  ENSURE(open_ != nullptr && image.width() == width_ && image.height() == height_);
+  ENSURE(rows_.empty() || row.size() == rows_.front().size());
+  int status = 0;
+  long size[3] = {width_, height_, static_cast<long>(rows_.size()) + 1};
+  // The file ends with the image, so that this only adds to it.
+  fits_resize_img(open_->file, USHORT_IMG, 3, size, &status);
+  long first[3] = {1, 1, size[2]};
+  const auto pixels = image.pixels();
+  fits_write_pix(open_->file, TUSHORT, first, static_cast<LONGLONG>(pixels.size()),
+                 const_cast<std::uint16_t*>(pixels.data()), &status);
+  check(status, path_);
+  rows_.push_back(row);
+}
+
+void FitsCube::close() {
+  if (open_ == nullptr) return;
+  const std::string part = path_ + ".part";
+  if (rows_.empty()) {
+    open_.reset();
+    std::remove(part.c_str());
+    return;
+  }
+  write_table();
+  open_->close(path_);
+  open_.reset();
+  put_in_place(part, path_);
+}
+
+void FitsCube::write_table() {
+  fitsfile* file = open_->file;
+  int status = 0;
+  std::vector<char*> names;
+  std::vector<char*> forms;
+  std::string real = "1D";
+  std::string whole = "1K";
+  for (FitsCard& card : rows_.front()) {
+    ENSURE(!std::holds_alternative<std::string>(card.value));
+    names.push_back(card.keyword.data());
+    forms.push_back(std::holds_alternative<double>(card.value) ? real.data() : whole.data());
+  }
+  fits_create_tbl(file, BINARY_TBL, static_cast<LONGLONG>(rows_.size()),
+                  static_cast<int>(names.size()), names.data(), forms.data(), nullptr, "FRAMES",
+                  &status);
+  for (std::size_t c = 0; c < names.size(); ++c) {
+    const int column = static_cast<int>(c) + 1;
+    const std::string keyword = "TTYPE" + std::to_string(column);
+    fits_modify_comment(file, keyword.c_str(), rows_.front()[c].comment.c_str(), &status);
+    for (std::size_t r = 0; r < rows_.size(); ++r) {
+      const auto row = static_cast<LONGLONG>(r) + 1;
+      if (const auto* x = std::get_if<double>(&rows_[r][c].value)) {
+        double value = *x;
+        fits_write_col(file, TDOUBLE, column, row, 1, 1, &value, &status);
+      } else {
+        long long value = std::get<long long>(rows_[r][c].value);
+        fits_write_col(file, TLONGLONG, column, row, 1, 1, &value, &status);
+      }
+    }
+  }
+  check(status, path_);
 }
 
 DnImage read_fits(const std::string& path) {

@@ -9,7 +9,15 @@
 namespace engine {
 
 /// Who draws. Streams never share a number, so a stage that draws one more shifts nobody else.
-enum class Stream : std::uint32_t { kLight = 1, kShot = 2, kShotDetail = 3, kRead = 4, kFaults = 20 };
+enum class Stream : std::uint32_t {
+  kLight = 1,
+  kShot = 2,
+  kShotDetail = 3,
+  kRead = 4,
+  kJitter = 20,
+  kAttitude = 21,
+  kFaults = 22
+};
 
 /// Random numbers as a function of (seed, stream, frame, place): same bits whatever the threads.
 ///

@@ -1,6 +1,7 @@
 #include "engine/render/footprint.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace engine {
@@ -8,6 +9,44 @@ namespace {
 
 // Far outside, yet small enough to become an int.
 constexpr double kOutside_px = 1e8;
+
+/// A triangle cut by four straight edges has at most seven corners.
+struct Polygon {
+  std::array<PixelPoint, 7> corner;
+  std::size_t corners = 0;
+  void add(const PixelPoint& p) noexcept {
+    if (corners < corner.size()) corner[corners++] = p;
+  }
+};
+
+double area_px2(const Polygon& polygon) noexcept {
+  double twice = 0;
+  for (std::size_t i = 1; i + 1 < polygon.corners; ++i) {
+    const PixelPoint& a = polygon.corner[0];
+    const PixelPoint& b = polygon.corner[i];
+    const PixelPoint& c = polygon.corner[i + 1];
+    twice += (b.u - a.u) * (c.v - a.v) - (c.u - a.u) * (b.v - a.v);
+  }
+  return 0.5 * std::abs(twice);
+}
+
+/// What lies on the side of `edge` that `sign` points to (Sutherland and Hodgman 1974,
+/// DOI 10.1145/360767.360802).
+Polygon clipped(const Polygon& in, double PixelPoint::*axis, double edge, double sign) noexcept {
+  Polygon out;
+  for (std::size_t i = 0; i < in.corners; ++i) {
+    const PixelPoint& from = in.corner[i];
+    const PixelPoint& to = in.corner[i + 1 < in.corners ? i + 1 : 0];
+    const double inside_from = sign * (from.*axis - edge);
+    const double inside_to = sign * (to.*axis - edge);
+    if (inside_from >= 0.0) out.add(from);
+    if ((inside_from < 0.0) != (inside_to < 0.0)) {
+      const double t = inside_from / (inside_from - inside_to);
+      out.add({from.u + t * (to.u - from.u), from.v + t * (to.v - from.v)});
+    }
+  }
+  return out;
+}
 
 }  // namespace
 
@@ -74,6 +113,41 @@ void Footprint::project(const Mesh& mesh, const Snapshot& snapshot) noexcept {
                    std::clamp(p.v, -kOutside_px, kOutside_px)};
   }
   for (const Mesh::Triangle& triangle : mesh.triangles) mark(box_round(triangle));
+  measure_visible(mesh);
+}
+
+void Footprint::measure_visible(const Mesh& mesh) noexcept {
+  const PixelRect frame = camera_.frame();
+  const double left = frame.left - 0.5;
+  const double top = frame.top - 0.5;
+  const double right = frame.right - 0.5;
+  const double bottom = frame.bottom - 0.5;
+  double all = 0;
+  double inside = 0;
+  for (const Mesh::Triangle& triangle : mesh.triangles) {
+    Polygon image;
+    int within = 0;
+    bool behind = false;
+    for (const std::uint32_t corner : triangle.corner) {
+      const PixelPoint& p = corners_[corner];
+      image.add(p);
+      behind = behind || p.u == -kOutside_px;
+      within += p.u >= left && p.u <= right && p.v >= top && p.v <= bottom ? 1 : 0;
+    }
+    if (behind) continue;
+    const double area = area_px2(image);
+    all += area;
+    if (within == 3) {
+      inside += area;
+      continue;
+    }
+    image = clipped(image, &PixelPoint::u, left, 1.0);
+    image = clipped(image, &PixelPoint::u, right, -1.0);
+    image = clipped(image, &PixelPoint::v, top, 1.0);
+    image = clipped(image, &PixelPoint::v, bottom, -1.0);
+    inside += area_px2(image);
+  }
+  visible_fraction_ = all > 0.0 ? std::min(1.0, inside / all) : 0.0;
 }
 
 }  // namespace engine

@@ -20,6 +20,10 @@ class Footprint {
 
   void project(const Mesh& mesh, const Snapshot& snapshot) noexcept;
 
+  /// Of the area that all triangles have on the detector's plane, the share that lies in the frame;
+  /// 0 when there is no area. A triangle with a corner behind the camera counts for none.
+  [[nodiscard]] double visible_fraction() const noexcept { return visible_fraction_; }
+
   /// Of the marked pixels; empty when the target is out of sight.
   [[nodiscard]] PixelRect region() const noexcept { return region_; }
   /// Pre: the pixel lies in region().
@@ -33,10 +37,12 @@ class Footprint {
   void mark(const PixelRect& box) noexcept;
   [[nodiscard]] PixelRect box_round(const Mesh::Triangle& triangle) const noexcept;
   void clear() noexcept;
+  void measure_visible(const Mesh& mesh) noexcept;
 
   CameraGeometry camera_;
   PixelRect limits_;
   PixelRect region_;
+  double visible_fraction_ = 0;
   std::vector<std::uint8_t> mask_;
   std::vector<PixelPoint> corners_;
 };

@@ -89,6 +89,7 @@ RenderReport PathTracer::render(const Snapshot& snapshot, Budget budget, Radianc
   RenderReport report;
   report.samples_per_pixel = per_cell * s * s;
   report.bounces = spec_.bounces;
+  report.visible_fraction = footprint_.visible_fraction();
   if (out.region.empty()) return report;
   facets_.light_up(snapshot, pool_);
   pool_.rows(0, out.region.height(),

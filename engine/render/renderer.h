@@ -46,6 +46,10 @@ struct RenderReport {
   std::uint64_t rejected_rays = 0;  ///< not finite or out of range: never given to the tracer
   int samples_per_pixel = 0;
   int bounces = 0;
+  /// Of the target's image, lit or not, the share that lies in the frame: 1 wholly inside, 0
+  /// outside. By area, each layer of surface for itself; the same as of the outline for a convex
+  /// body.
+  double visible_fraction = 0;
 };
 
 /// Thread: loop; it owns its workers. Loop-safe: the scene is built in the constructor.

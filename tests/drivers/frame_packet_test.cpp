@@ -36,7 +36,8 @@ DnImage numbered(int width, int height) {
 }
 
 Bytes encoded(const Frame& frame) {
-  Bytes bytes(frame_bytes(frame.pixels->width(), frame.pixels->height()));
+  Bytes bytes(frame_bytes(frame.pixels->width(), frame.pixels->height(),
+                          frame.telemetry_row.empty() ? 0 : 1));
   const auto used = encode_frame(frame, bytes);
   EXPECT_TRUE(used.ok());
   EXPECT_EQ(used.value(), bytes.size());
@@ -60,8 +61,8 @@ T read_at(std::span<const std::byte> bytes, std::size_t at) {
 template <class T>
 void forge(std::span<std::byte> bytes, std::size_t at, const T& value) {
   std::memcpy(bytes.data() + at, &value, sizeof value);
-  const std::uint32_t crc = engine::crc32c(bytes.first(92));
-  std::memcpy(bytes.data() + 92, &crc, sizeof crc);
+  const std::uint32_t crc = engine::crc32c(bytes.first(188));
+  std::memcpy(bytes.data() + 188, &crc, sizeof crc);
 }
 
 void expect_refused(std::span<const std::byte> bytes, const std::string& step) {
@@ -79,6 +80,9 @@ TEST(FramePacket, EveryFieldOfAFrameComesBack) {
   frame.exposure = Duration(1'000'001);
   frame.bits = 14;
   frame.trim_rad = {-1.25e-6, 3.0e-300};
+  frame.measured.j2000_to_camera = {0.5, -0.5, 0.5, -0.5};
+  frame.measured.rate_rad_s = {1e-3, -2e-3, 3e-3};
+  frame.counts = {1, 0xFFFFFFFFFFFFFFFFULL, 3, 4};
   frame.pixels = &pixels;
   const Bytes bytes = encoded(frame);
   const auto view = decode_frame(bytes);
@@ -89,7 +93,14 @@ TEST(FramePacket, EveryFieldOfAFrameComesBack) {
   EXPECT_EQ(v.frame.exposure, frame.exposure);
   EXPECT_EQ(v.frame.bits, frame.bits);
   EXPECT_EQ(v.frame.trim_rad, frame.trim_rad);
+  EXPECT_EQ(v.frame.measured.j2000_to_camera, frame.measured.j2000_to_camera);
+  EXPECT_EQ(v.frame.measured.rate_rad_s, frame.measured.rate_rad_s);
+  EXPECT_EQ(v.frame.counts.skipped, frame.counts.skipped);
+  EXPECT_EQ(v.frame.counts.dropped, frame.counts.dropped);
+  EXPECT_EQ(v.frame.counts.late, frame.counts.late);
+  EXPECT_EQ(v.frame.counts.commands, frame.counts.commands);
   EXPECT_EQ(v.frame.pixels, nullptr);
+  EXPECT_TRUE(v.telemetry_row.empty());
   EXPECT_EQ(v.width_px, 5);
   EXPECT_EQ(v.height_px, 3);
   ASSERT_EQ(v.pixels.size(), 30U);
@@ -116,11 +127,13 @@ TEST(FramePacket, FieldsLieWhereTheHeaderSaysInLittleEndian) {
   frame.exposure = Duration(5'000'000);
   frame.bits = 11;
   frame.trim_rad = {1.5, -2.5};
+  frame.measured = {.j2000_to_camera = {1, 2, 3, 4}, .rate_rad_s = {5, 6, 7}};
+  frame.counts = {.skipped = 8, .dropped = 9, .late = 10, .commands = 11};
   frame.pixels = &pixels;
   const Bytes bytes = encoded(frame);
-  ASSERT_EQ(bytes.size(), 96U + 28U);
-  EXPECT_EQ(std::memcmp(bytes.data(), "SLF1", 4), 0);
-  EXPECT_EQ(read_at<std::uint16_t>(bytes, 4), 96);
+  ASSERT_EQ(bytes.size(), 192U + 28U);
+  EXPECT_EQ(std::memcmp(bytes.data(), "SLF2", 4), 0);
+  EXPECT_EQ(read_at<std::uint16_t>(bytes, 4), 192);
   EXPECT_EQ(bytes[8], std::byte{8});
   EXPECT_EQ(bytes[15], std::byte{1});
   EXPECT_EQ(read_at<std::int64_t>(bytes, 16), 1'234'567'890'123);
@@ -128,15 +141,55 @@ TEST(FramePacket, FieldsLieWhereTheHeaderSaysInLittleEndian) {
   EXPECT_EQ(read_at<std::uint16_t>(bytes, 32), 7);
   EXPECT_EQ(read_at<std::uint16_t>(bytes, 34), 2);
   EXPECT_EQ(read_at<std::uint8_t>(bytes, 36), 11);
-  EXPECT_EQ(read_at<double>(bytes, 56), 1.5);
-  EXPECT_EQ(read_at<double>(bytes, 64), -2.5);
-  EXPECT_EQ(read_at<std::uint32_t>(bytes, 72), 28U);
-  EXPECT_EQ(read_at<std::uint32_t>(bytes, 76), engine::crc32c(std::span(bytes).subspan(96)));
-  EXPECT_EQ(read_at<std::uint32_t>(bytes, 92), engine::crc32c(std::span(bytes).first(92)));
-  EXPECT_EQ(read_at<std::uint16_t>(bytes, 96 + 2 * 13), 13);
-  for (const auto& [from, to] : {std::pair{6, 8}, {37, 56}, {80, 92}})
+  EXPECT_EQ(read_at<std::uint8_t>(bytes, 37), 0);
+  EXPECT_EQ(read_at<double>(bytes, 40), 1.5);
+  EXPECT_EQ(read_at<double>(bytes, 48), -2.5);
+  for (std::size_t i = 0; i < 7; ++i)
+    EXPECT_EQ(read_at<double>(bytes, 56 + 8 * i), static_cast<double>(i + 1));
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(read_at<std::uint64_t>(bytes, 112 + 8 * i), 8 + i);
+  EXPECT_EQ(read_at<std::uint32_t>(bytes, 144), 28U);
+  EXPECT_EQ(read_at<std::uint32_t>(bytes, 148), engine::crc32c(std::span(bytes).subspan(192)));
+  EXPECT_EQ(read_at<std::uint32_t>(bytes, 188), engine::crc32c(std::span(bytes).first(188)));
+  EXPECT_EQ(read_at<std::uint16_t>(bytes, 192 + 2 * 13), 13);
+  for (const auto& [from, to] : {std::pair{6, 8}, {38, 40}, {152, 188}})
     for (int i = from; i < to; ++i)
       EXPECT_EQ(bytes[static_cast<std::size_t>(i)], std::byte{0}) << "reserved byte " << i;
+}
+
+TEST(FramePacket, ATelemetryRowComesBackApartFromTheImage) {
+  const DnImage pixels = numbered(5, 3);
+  const std::vector<std::uint16_t> row{2047, 0, 1, 1024, 7};
+  Frame frame = plain_frame(pixels);
+  frame.telemetry_row = row;
+  const Bytes bytes = encoded(frame);
+  ASSERT_EQ(bytes.size(), frame_bytes(5, 3) + 10);
+  ASSERT_EQ(bytes.size(), drivers::largest_frame_bytes(5, 3));
+  EXPECT_EQ(read_at<std::uint8_t>(bytes, 37), 1);
+  const auto view = decode_frame(bytes);
+  ASSERT_TRUE(view.ok());
+  EXPECT_EQ(view.value().height_px, 3);
+  ASSERT_EQ(view.value().pixels.size(), 30U);
+  EXPECT_EQ(std::memcmp(view.value().pixels.data(), pixels.pixels().data(), 30), 0);
+  ASSERT_EQ(view.value().telemetry_row.size(), 10U);
+  EXPECT_EQ(std::memcmp(view.value().telemetry_row.data(), row.data(), 10), 0);
+}
+
+TEST(FramePacket, ATelemetryRowOfAnotherWidthIsRefusedByBothSides) {
+  const DnImage pixels = numbered(5, 3);
+  for (const std::size_t width : {1U, 4U, 6U}) {
+    const std::vector<std::uint16_t> row(width);
+    Frame frame = plain_frame(pixels);
+    frame.telemetry_row = row;
+    Bytes bytes(1000);
+    EXPECT_FALSE(encode_frame(frame, bytes).ok()) << width;
+  }
+  Bytes bytes = encoded(plain_frame(pixels));
+  forge(bytes, 37, std::uint8_t{1});
+  expect_refused(bytes, "length of the payload");
+  for (const int rows : {2, 255}) {
+    forge(bytes, 37, static_cast<std::uint8_t>(rows));
+    expect_refused(bytes, "rows below the image");
+  }
 }
 
 TEST(FramePacket, All2048CodesOfElevenBitsComeBack) {
@@ -222,7 +275,7 @@ TEST(FramePacket, AFrameTruncatedAtAnyLengthOrOneByteTooLongIsRefused) {
 
 TEST(FramePacket, WrongMagicIsRefusedEvenWithARightChecksum) {
   const DnImage pixels = numbered(4, 4);
-  for (const char* magic : {"SLC1", "SLF2", "slf1", "\0\0\0"}) {
+  for (const char* magic : {"SLC1", "SLF1", "slf1", "\0\0\0"}) {
     Bytes bytes = encoded(plain_frame(pixels));
     std::array<char, 4> four{};
     std::copy_n(magic, 4, four.begin());
@@ -255,21 +308,21 @@ TEST(FramePacket, AbsurdSizesAreRefusedEvenWithARightChecksum) {
 
 TEST(FramePacket, WrongLengthsInTheHeaderAreRefusedEvenWithARightChecksum) {
   const DnImage pixels = numbered(4, 4);
-  for (const int length : {0, 95, 97, 192, 65535}) {
+  for (const int length : {0, 96, 191, 193, 65535}) {
     Bytes bytes = encoded(plain_frame(pixels));
     forge(bytes, 4, static_cast<std::uint16_t>(length));
     expect_refused(bytes, "header length");
   }
   for (const std::uint32_t length : {0U, 31U, 33U, 0xFFFFFFFFU}) {
     Bytes bytes = encoded(plain_frame(pixels));
-    forge(bytes, 72, length);
+    forge(bytes, 144, length);
     expect_refused(bytes, "length of the payload");
   }
 }
 
-TEST(FramePacket, ATrimThatIsNotFiniteIsRefused) {
+TEST(FramePacket, ATrimAttitudeOrRateThatIsNotFiniteIsRefused) {
   const DnImage pixels = numbered(4, 4);
-  for (const std::size_t at : {56U, 64U}) {
+  for (std::size_t at = 40; at < 112; at += 8) {
     for (const double bad : {std::nan(""), std::numeric_limits<double>::infinity()}) {
       Bytes bytes = encoded(plain_frame(pixels));
       forge(bytes, at, bad);
@@ -294,11 +347,11 @@ TEST(FramePacket, AHundredThousandRandomDatagramsAreRefused) {
   int taken = 0;
   for (int i = 0; i < 100'000; ++i) {
     // Exactly as long as its bytes: a sanitizer sees a read past the end.
-    Bytes bytes(random() % 300);
+    Bytes bytes(random() % 500);
     for (std::byte& b : bytes) b = static_cast<std::byte>(random());
     // Half of them get as far as the checksum; a quarter past it, to the fields.
-    if (bytes.size() >= 96 && i % 2 == 0) {
-      std::memcpy(bytes.data(), "SLF1", 4);
+    if (bytes.size() >= 192 && i % 2 == 0) {
+      std::memcpy(bytes.data(), "SLF2", 4);
       if (i % 4 == 0) forge(std::span(bytes), 6, std::uint16_t{0});
     }
     if (decode_frame(bytes).ok()) ++taken;
@@ -312,7 +365,7 @@ TEST(FramePacket, RandomHeadersWithARightChecksumNeverMakeAFrameOfAnotherLength)
   const Bytes good = encoded(plain_frame(pixels));
   for (int i = 0; i < 100'000; ++i) {
     Bytes bytes = good;
-    const std::size_t at = random() % 92;
+    const std::size_t at = random() % 188;
     forge(std::span(bytes), at, static_cast<std::byte>(random()));
     const auto view = decode_frame(bytes);
     if (!view.ok()) continue;

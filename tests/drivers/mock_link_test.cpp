@@ -102,7 +102,7 @@ TEST(MockLink, TheBytesStayTheDevicesUntilItReleasesThem) {
 
 TEST(MockLink, AFrameLargerThanTheLinkIsRefusedAndCostsNoSlot) {
   MockLink link(6, 4);
-  const DnImage large(7, 4);
+  const DnImage large(7, 5);
   for (int i = 0; i < 10; ++i) {
     const auto status = link.send(frame_of(99, large), kAtOnce);
     ASSERT_FALSE(status.ok());

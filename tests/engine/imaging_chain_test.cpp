@@ -63,6 +63,10 @@ class Rig {
     return s;
   }
   FrameReport expose(const Shot& s, DnImage& out) { return chain_->expose(s, {}, out, mask_); }
+  FrameReport expose(const Shot& s, DnImage& out, TruthMask& mask) {
+    return chain_->expose(s, {}, out, mask);
+  }
+  [[nodiscard]] const TruthMask& mask() const { return mask_; }
 
   Flyby flyby;
 
@@ -71,6 +75,10 @@ class Rig {
   std::unique_ptr<ImagingChain> chain_;
   TruthMask mask_{1024};
 };
+
+bool same_run(const TruthMask::Run& a, const TruthMask::Run& b) {
+  return a.row == b.row && a.begin == b.begin && a.end == b.end;
+}
 
 TEST(ImagingChain, AFrameHasTheSameBitsOnAnyNumberOfThreads) {
   Rig one(1);
@@ -85,6 +93,8 @@ TEST(ImagingChain, AFrameHasTheSameBitsOnAnyNumberOfThreads) {
     EXPECT_TRUE(std::ranges::equal(first.pixels(), again.pixels())) << threads;
     EXPECT_EQ(same.truth.photocentre_px.u, report.truth.photocentre_px.u);
     EXPECT_EQ(same.truth.peak_e, report.truth.peak_e);
+    EXPECT_EQ(same.truth.signal_to_noise, report.truth.signal_to_noise);
+    EXPECT_TRUE(std::ranges::equal(rig.mask().runs(), one.mask().runs(), same_run));
   }
 }
 
@@ -120,6 +130,11 @@ TEST(ImagingChain, WithoutATargetThereIsSkyAndNoPhotocentre) {
     EXPECT_TRUE(std::isnan(report.truth.photocentre_px.u));
     EXPECT_TRUE(std::isnan(report.truth.photocentre_px.v));
     EXPECT_EQ(report.truth.peak_e, 0.0);
+    EXPECT_TRUE(rig.mask().runs().empty());
+    EXPECT_TRUE(report.truth.box.empty());
+    EXPECT_EQ(report.truth.mask_px, 0);
+    EXPECT_EQ(report.truth.signal_to_noise, 0.0);
+    EXPECT_EQ(report.truth.visible_fraction, 0.0);
     EXPECT_EQ(report.render.hits, 0U);
     EXPECT_TRUE(report.optics.window.empty());
     // .035 e- of dark current, and a sky fainter still: 14.6 e- make one DN.
@@ -162,6 +177,145 @@ TEST(ImagingChain, TruthIsThatOfTheSnapshot) {
   EXPECT_EQ(report.render.rejected_rays, 0U);
   EXPECT_EQ(report.peak_dn, *std::max_element(out.pixels().begin(), out.pixels().end()));
   EXPECT_EQ(report.times.render, Duration{});  // no stopwatch, no time
+}
+
+TEST(ImagingChain, BoxAndAreaAreThoseOfTheMask) {
+  Rig rig(1);
+  DnImage out;
+  for (const double off_px : {0.0, 100.0}) {  // whole, and cut by the frame's edge
+    const FrameTruth truth = rig.expose(rig.shot(kClosestOfPass3_s, off_px), out).truth;
+    ASSERT_FALSE(rig.mask().truncated());
+    ASSERT_FALSE(rig.mask().runs().empty());
+    PixelRect box{kSide_px, kSide_px, 0, 0};
+    int pixels = 0;
+    TruthMask::Run last{0, 0, 0};
+    for (const TruthMask::Run& run : rig.mask().runs()) {
+      ASSERT_LT(run.begin, run.end);
+      // In order, with a dark pixel between two runs of a row.
+      ASSERT_TRUE(run.row > last.row || run.begin > last.end || pixels == 0);
+      last = run;
+      pixels += run.end - run.begin;
+      box = {std::min<int>(box.left, run.begin), std::min<int>(box.top, run.row),
+             std::max<int>(box.right, run.end), std::max<int>(box.bottom, run.row + 1)};
+    }
+    EXPECT_EQ(truth.mask_px, pixels);
+    EXPECT_EQ(truth.box.left, box.left);
+    EXPECT_EQ(truth.box.top, box.top);
+    EXPECT_EQ(truth.box.right, box.right);
+    EXPECT_EQ(truth.box.bottom, box.bottom);
+    EXPECT_EQ(box.left == 0, off_px > 0.0);
+    EXPECT_GT(truth.signal_to_noise, 100.0);
+  }
+}
+
+TEST(ImagingChain, AMaskWithoutRoomSaysSoAndTheFiguresStayWhole) {
+  Rig rig(1);
+  DnImage out;
+  const Shot shot = rig.shot(kClosestOfPass3_s);
+  const FrameTruth whole = rig.expose(shot, out).truth;
+  TruthMask small(3);
+  const FrameTruth cut = rig.expose(shot, out, small).truth;
+  EXPECT_TRUE(small.truncated());
+  EXPECT_EQ(small.runs().size(), 3U);
+  EXPECT_EQ(cut.mask_px, whole.mask_px);
+  EXPECT_EQ(cut.box.bottom, whole.box.bottom);
+  EXPECT_EQ(cut.signal_to_noise, whole.signal_to_noise);
+}
+
+TEST(ImagingChain, HalfOfABallOnTheEdgeOfTheFrameIsVisible) {
+  const Mesh ball = test_support::sphere(1.0F, 24, 48, "white");
+  Rig rig(1, ball, {test_support::lambert_material("white", 0.3)});
+  DnImage out;
+  const double t_s = kClosestOfPass3_s + 8.0;
+  EXPECT_EQ(rig.expose(rig.shot(t_s), out).truth.visible_fraction, 1.0);
+  // The edge is half a pixel beyond the centre of pixel 0. The mesh is its own mirror image, so the
+  // halves are equal but for the tilt's tangent: .03 px of a ball of 12.
+  const FrameTruth half = rig.expose(rig.shot(t_s, kSide_px / 2.0 + 0.5), out).truth;
+  EXPECT_NEAR(half.visible_fraction, 0.5, 3e-3);
+}
+
+/// The same radiance wherever light can come from, or a square of it in the middle.
+class Patch final : public Renderer {
+ public:
+  Patch(double radiance_w_m2_sr, const PixelRect& region)
+      : radiance_w_m2_sr_(radiance_w_m2_sr), region_(region) {}
+  RenderReport render(const Snapshot& /*snapshot*/, Budget /*budget*/,
+                      Radiance& out) noexcept override {
+    out.region = region_;
+    out.oversampling = 3;
+    out.grid.resize(region_.width() * 3, region_.height() * 3);
+    std::ranges::fill(out.grid.pixels(), static_cast<float>(radiance_w_m2_sr_));
+    out.uniform_w_m2_sr = 0;
+    return {};
+  }
+
+ private:
+  double radiance_w_m2_sr_;
+  PixelRect region_;
+};
+
+struct Seen {
+  FrameTruth truth;
+  std::size_t runs = 0;
+  double noise_e = 0;
+};
+
+/// A patch that brings `light_e` to each pixel in a millisecond, exposed for `exposure`.
+Seen see_patch(double light_e, bool fills_frame, Duration exposure) {
+  const Flyby flyby;
+  WorkerPool pool(1);
+  SceneSpec scene;
+  scene.epoch = flyby.epoch;
+  scene.camera = test_support::small_camera(64);
+  OpticsSpec optics_spec;
+  optics_spec.camera = scene.camera;
+  const DetectorSpec detector;
+  const double to_e = detector.electrons_per_irradiance(std::chrono::milliseconds(1));
+  Optics optics(optics_spec, 1e-3 * light_e / to_e, pool);
+  const double radiance = light_e / to_e / optics.throughput_sr();
+  const PixelRect region =
+      fills_frame ? scene.camera.frame().grown_by(64) : scene.camera.frame().grown_by(-24);
+  ImagingChain chain(SnapshotBuilder(scene, flyby.camera, flyby.target),
+                     std::make_unique<Patch>(radiance, region), std::move(optics),
+                     Detector(detector, pool), detector, scene.camera);
+  Shot shot;
+  shot.exposure = exposure;
+  shot.shutter_open = sim_time(kClosestOfPass3_s);
+  DnImage out;
+  TruthMask mask(1024);
+  Seen seen;
+  seen.truth = chain.expose(shot, {}, out, mask).truth;
+  seen.runs = mask.runs().size();
+  seen.noise_e = detector.noise_e(detector.dark_e_s * seconds(exposure));
+  return seen;
+}
+
+TEST(ImagingChain, SignalToNoiseOfAUniformFieldIsTheClosedForm) {
+  for (const double light_e : {6.0, 100.0, 5000.0}) {
+    SCOPED_TRACE(light_e);
+    const Seen seen = see_patch(light_e, true, std::chrono::milliseconds(1));
+    EXPECT_EQ(seen.truth.mask_px, 64 * 64);
+    EXPECT_EQ(seen.runs, 64U);
+    EXPECT_EQ(seen.truth.box.right, 64);
+    // n e / sqrt(n e + n s^2). The wings that are cut off at 64 px hold .3 % of the light.
+    const double expected = 64.0 * light_e / std::sqrt(light_e + seen.noise_e * seen.noise_e);
+    EXPECT_NEAR(seen.truth.signal_to_noise / expected, 1.0, 5e-3);
+  }
+  // 4.7 e- of noise: a field fainter than that is not there.
+  const Seen faint = see_patch(4.0, true, std::chrono::milliseconds(1));
+  EXPECT_GT(faint.noise_e, 4.5);
+  EXPECT_EQ(faint.truth.mask_px, 0);
+  EXPECT_EQ(faint.truth.signal_to_noise, 0.0);
+}
+
+TEST(ImagingChain, MaskGrowsWithTheExposureAsTheWingsOfLightRiseOverTheNoise) {
+  int last_px = 0;
+  for (const int ms : {1, 4, 16, 64}) {
+    const Seen seen = see_patch(100.0, false, std::chrono::milliseconds(ms));
+    EXPECT_GT(seen.truth.mask_px, last_px) << ms;
+    EXPECT_GE(seen.truth.mask_px, 16 * 16);
+    last_px = seen.truth.mask_px;
+  }
 }
 
 }  // namespace

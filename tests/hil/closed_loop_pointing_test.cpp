@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "engine/scene/camera_geometry.h"
+#include "tests/support/bodies.h"
 
 namespace {
 
@@ -17,16 +18,6 @@ using hil::Command;
 using hil::CommandKind;
 using hil::GuidanceError;
 using hil::ScriptedPointing;
-
-/// Stays where it is.
-class Fixed final : public engine::Propagator {
- public:
-  explicit Fixed(const Eigen::Vector3d& m) { state_.position.m = m; }
-  [[nodiscard]] engine::OrbitState at(Epoch /*t*/) const noexcept override { return state_; }
-
- private:
-  engine::OrbitState state_;
-};
 
 const Eigen::Vector3d kCamera_m(7e6, 1e5, -2e5);
 const Eigen::Vector3d kLine_m(4e4, -9e4, 3e4);
@@ -41,8 +32,8 @@ class ClosedLoopPointingTest : public testing::Test {
     return attitude.axes.matrix * kLine_m.normalized();
   }
 
-  Fixed camera_{kCamera_m};
-  Fixed target_{kCamera_m + kLine_m};
+  test_support::FixedBody camera_{kCamera_m};
+  test_support::FixedBody target_{kCamera_m + kLine_m};
 };
 
 // Directions are unit vectors of doubles, turned by two rotations: a few 1e-16 rad.

@@ -6,7 +6,9 @@
 #include <gtest/gtest.h>
 
 #include "engine/core/constants.h"
+#include "hil/closed_loop_pointing.h"
 #include "hil/frame_loop.h"
+#include "tests/support/bodies.h"
 #include "tests/support/fakes.h"
 
 namespace {
@@ -16,9 +18,11 @@ using hil::CommandKind;
 using hil::Frame;
 
 /// What is left of a pointing error of 1 after `frames` frames of lockstep, when the software under
-/// test takes `gain` of the error it sees off its trim, and answers `late` frames late. The
-/// actuator is ideal, so x[k + 1] = x[k] - gain * x[k - late - d], and d is the loop's own delay.
-double error_left(double gain, std::size_t late, std::uint64_t frames) {
+/// test takes `gain` of the error it sees off its trim, and answers `late` frames late, and a trim
+/// of 1 turns `pointing` by `unit_rad`. The actuator is ideal, so x[k + 1] = x[k] - gain * x[k -
+/// late - d], and d is the delay of loop and pointing.
+double error_left(hil::PointingSource& pointing, engine::SceneGenerator& generator, double unit_rad,
+                  double gain, std::size_t late, std::uint64_t frames) {
   hil::LoopSpec spec;
   spec.frames = frames;
   spec.width_px = 5;
@@ -26,8 +30,6 @@ double error_left(double gain, std::size_t late, std::uint64_t frames) {
   spec.when_busy = hil::WhenBusy::kWait;
   spec.answer_timeout = std::chrono::seconds(20);
   hil::ManualClock clock(spec.start - spec.period);
-  fakes::IdealPointing pointing(1.0);
-  fakes::PixelGenerator generator;
   double trim = 0;
   std::deque<double> seen(late, 0.0);
   double largest = 0;
@@ -41,7 +43,7 @@ double error_left(double gain, std::size_t late, std::uint64_t frames) {
     Command command;
     command.answers_frame = frame.sequence;
     command.kind = CommandKind::kTrim;
-    command.trim_offset_rad = {trim, 0.0};
+    command.trim_offset_rad = {unit_rad * trim, 0.0};
     return command;
   });
   hil::FrameLoop loop(spec, clock, pointing, generator, device, device);
@@ -49,6 +51,51 @@ double error_left(double gain, std::size_t late, std::uint64_t frames) {
   EXPECT_EQ(report.sent, frames);
   EXPECT_FALSE(report.answer_missing);
   return largest;
+}
+
+double error_left(double gain, std::size_t late, std::uint64_t frames) {
+  fakes::IdealPointing pointing(1.0);
+  fakes::PixelGenerator generator;
+  return error_left(pointing, generator, 1.0, gain, late, frames);
+}
+
+// A nanoradian, so that what grows ten thousand times is still a small angle.
+constexpr double kUnit_rad = 1e-9;
+
+/// Sees by how many units the boresight is off the target, at mid-exposure.
+class BoresightGenerator final : public engine::SceneGenerator {
+ public:
+  explicit BoresightGenerator(const Eigen::Vector3d& to_target) : to_target_(to_target) {}
+  engine::FrameReport expose(const engine::Shot& shot, engine::Budget budget, engine::DnImage& out,
+                             engine::TruthMask& mask) noexcept override {
+    const Eigen::Vector3d seen = shot.attitude.middle.axes.matrix * to_target_;
+    engine::Shot told = shot;
+    told.attitude.middle.axes.matrix(0, 0) = -std::atan2(seen.x(), seen.z()) / kUnit_rad;
+    return pixels_.expose(told, budget, out, mask);
+  }
+
+ private:
+  Eigen::Vector3d to_target_;
+  fakes::PixelGenerator pixels_;
+};
+
+/// The same with the real pointing: a guidance error of one unit, and an ideal actuator that takes
+/// commands `delay` frames late.
+double error_left_by_the_camera(double gain, int delay, std::uint64_t frames) {
+  const Eigen::Vector3d camera_m(7e6, 1e5, -2e5);
+  const Eigen::Vector3d line_m(4e4, -9e4, 3e4);
+  const test_support::FixedBody camera(camera_m);
+  const test_support::FixedBody target(camera_m + line_m);
+  hil::PointingSpec spec;
+  spec.error.offset_rad = {kUnit_rad, 0.0};
+  spec.actuator.ideal = true;
+  spec.actuator.delay = delay * hil::LoopSpec{}.period;
+  hil::ClosedLoopPointing pointing(
+      hil::ScriptedPointing(camera, target, engine::Epoch{}, engine::LightPath::kGeometric,
+                            hil::RollRule::kCelestial),
+      spec);
+  BoresightGenerator generator(line_m);
+  return error_left(pointing, generator, kUnit_rad, gain, 0, frames);
 }
 
 // x[k + 1] = x[k] - g x[k - d] is stable for 0 < g < 2 sin(pi / (2 (2 d + 1))).
@@ -71,6 +118,17 @@ TEST(LoopLatency, EveryFrameMoreLowersTheCriticalGainAsThePeriodsSay) {
     const double g = critical_gain(d);
     EXPECT_LT(error_left(0.95 * g, static_cast<std::size_t>(d), 600), 0.1);
     EXPECT_GT(error_left(1.05 * g, static_cast<std::size_t>(d), 600), 10.0);
+  }
+}
+
+TEST(LoopLatency, OfTheCameraThatObeysIsTheLoopsOwnFrameAndTheActuatorsDelay) {
+  // Critical gains 2, 1, 0.618, 0.445 for delays of 0 to 3 periods; as above, but rounding of
+  // angles to 1e-16 is 1e-7 units.
+  for (int d = 0; d <= 3; ++d) {
+    SCOPED_TRACE(d);
+    const double g = critical_gain(d);
+    EXPECT_LT(error_left_by_the_camera(0.95 * g, d, 600), 0.1);
+    EXPECT_GT(error_left_by_the_camera(1.05 * g, d, d == 0 ? 150 : 600), 10.0);
   }
 }
 

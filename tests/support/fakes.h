@@ -138,7 +138,11 @@ class QueueSource final : public hil::CommandSource {
   }
 
   /// Thread: one, for all three.
-  void give(const hil::Command& command) noexcept { push({false, {}, command}); }
+  /// Numbers the commands, as any sender does.
+  void give(hil::Command command) noexcept {
+    command.sequence = given_ + 1;
+    push({false, {}, command});
+  }
   void give(const engine::Error& fault) noexcept { push({true, fault, {}}); }
   /// Returns when the receiver has come back for more: it has then dealt with all it was given.
   void wait_until_taken() const noexcept {

@@ -1,6 +1,7 @@
 // The loop with everything real in it but the cable and the software under test: once the first
 // shutter has opened, nobody takes anything from the heap.
 
+#include <array>
 #include <cstdlib>
 #include <memory>
 #include <thread>
@@ -20,10 +21,20 @@ using engine::Duration;
 starloop::Scenario small_scenario() {
   starloop::CommonOptions options;
   options.file = STARLOOP_SOURCE_DIR "/config/flyby.toml";
-  options.overrides = {"camera.width_px=128",        "camera.height_px=128",
-                       "camera.pixel_pitch_um=13",   "optics.aperture_m=0.18",
-                       "render.samples_per_pixel=4", "optics.largest_wing_px=16",
-                       "guidance.error_x_urad=5",    "guidance.error_growth_x_urad_s=1"};
+  options.overrides = {"camera.width_px=128",
+                       "camera.height_px=128",
+                       "camera.pixel_pitch_um=13",
+                       "optics.aperture_m=0.18",
+                       "render.samples_per_pixel=4",
+                       "optics.largest_wing_px=16",
+                       "guidance.error_x_urad=5",
+                       "guidance.error_growth_x_urad_s=1",
+                       "guidance.target_error_along_m=1",
+                       "actuator.delay_ms=9",
+                       "jitter.lines.wheel.frequency_hz=40",
+                       "jitter.lines.wheel.amplitude_urad=1",
+                       "sensors.star_tracker_across_arcsec=1",
+                       "sensors.gyro_noise_deg_rt_h=0.01"};
   return starloop::load_scenario(options);
 }
 
@@ -55,9 +66,7 @@ class Bench {
     spec.height_px = scenario_.scene.camera.height_px;
     spec.bits = scenario_.detector.bits;
     drivers::MockLink link(spec.width_px, spec.height_px);
-    hil::GuidanceError guidance = scenario_.guidance;
-    guidance.start = spec.start;
-    hil::ClosedLoopPointing pointing(rig_.prediction(), guidance, scenario_.actuator);
+    hil::ClosedLoopPointing pointing = starloop::make_pointing(scenario_, rig_, spec.start);
     hil::ManualClock clock(spec.start - spec.period);
     auto loop = std::make_unique<hil::FrameLoop>(spec, clock, pointing, rig_.chain(), link, link);
 
@@ -88,9 +97,13 @@ class Bench {
       if (!bytes.ok()) continue;
       const auto view = drivers::decode_frame(bytes.value());
       ENSURE(view.ok());
+      // Trims, rates and changes of line, all of which leave the target in the frame.
+      constexpr std::array kKinds{hil::CommandKind::kTrim, hil::CommandKind::kRate,
+                                  hil::CommandKind::kMode};
       hil::Command command;
-      command.kind = hil::CommandKind::kTrim;
+      command.kind = kKinds[view.value().frame.sequence % kKinds.size()];
       command.answers_frame = view.value().frame.sequence;
+      command.sequence = command.answers_frame + 1;
       command.trim_offset_rad = {-5e-6, 0.0};
       command.reference = view.value().frame.shutter_open;
       const hil::CommandPacket packet = hil::encode_command(command);

@@ -86,6 +86,28 @@ TEST(Scenario, ThePapersPassLoads) {
   EXPECT_DOUBLE_EQ(s.criteria.pointing_rms_px, 0.5);
 }
 
+TEST(Scenario, PointingIsWithoutFlawsUnlessItSaysOtherwise) {
+  const Scenario s = load();
+  EXPECT_EQ(s.mode, hil::GuidanceMode::kPredictedTarget);
+  EXPECT_EQ(s.target_knowledge.ahead_s, 0.0);
+  EXPECT_EQ(s.actuator.delay, engine::Duration{});
+  EXPECT_TRUE(s.jitter.lines.empty());
+  EXPECT_EQ(s.sensors.across_rad, 0.0);
+}
+
+TEST(Scenario, PointingTakesItsModeItsErrorsItsJitterAndItsSensors) {
+  const Scenario s =
+      load({"guidance.mode=nadir", "guidance.target_error_along_m=12", "actuator.delay_ms=40",
+            "jitter.lines.wheel.frequency_hz=40", "jitter.lines.wheel.amplitude_urad=2",
+            "sensors.star_tracker_roll_arcsec=3600"});
+  EXPECT_EQ(s.mode, hil::GuidanceMode::kNadir);
+  EXPECT_EQ(s.target_knowledge.along_m, 12.0);
+  EXPECT_EQ(s.actuator.delay, engine::Duration(40'000'000));
+  ASSERT_EQ(s.jitter.lines.size(), 1U);
+  EXPECT_EQ(s.jitter.lines[0].frequency_hz, 40.0);
+  EXPECT_NEAR(s.sensors.roll_rad, 0.0174532925, 1e-9);
+}
+
 TEST(Scenario, OverridesAndTheSeedReplaceWhatTheFileSays) {
   const Scenario s = load({"detector.read_noise_e=4", "run.clock=lockstep", "scenario.name=other"});
   EXPECT_EQ(s.run.clock, starloop::ClockMode::kLockstep);

@@ -137,6 +137,54 @@ TEST(StarloopRun, ExitCodeAndReportSayWhetherTheCriterionWasMet) {
   }
 }
 
+TEST(StarloopRun, AMissedCriterionOfDetectionIsSaidAndEndsWithOne) {
+  const TemporaryFolder folder;
+  // Lockstep takes one frame from an answer to the first that shows it; none is asked for.
+  const Outcome run = short_run(
+      folder.path(), {"--set", "run.duration_s=0.5", "--set", "criteria.pointing_rms_px=0", "--set",
+                      "criteria.max_latency_frames=0", "--set", "criteria.min_detection_rate=0.9"});
+  EXPECT_EQ(run.exit_code, kCriterionFailed);
+  EXPECT_NE(run.out.find("the largest latency in frames is 1, and must be at most 0"),
+            std::string::npos)
+      << run.out << run.err;
+  EXPECT_EQ(run.out.find("the detection rate"), std::string::npos) << run.out;
+  const nlohmann::json report = report_of(folder.path());
+  EXPECT_EQ(report.at("criteria_met"), false);
+  EXPECT_EQ(report.at("detection").at("detected"), 6);
+  EXPECT_EQ(report.at("statistics").at("latency").at("max"), 1.0);
+  EXPECT_EQ(report.at("truth"),
+            (nlohmann::json{{"frames", 6}, {"frames_lost", 0}, {"masks_lost", 0}}));
+}
+
+TEST(StarloopRun, TruthOfEveryFrameAndOfEveryPictureIsInTheFolder) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(short_run(folder.path(), {"--set", "run.duration_s=0.5", "--set", "run.record_every=2",
+                                      "--set", "criteria.pointing_rms_px=0"})
+                .exit_code,
+            kGood);
+  const fs::path latest = folder.path() / "latest";
+  std::istringstream lines(content_of(latest / "truth.jsonl"));
+  int frames = 0;
+  for (std::string line; std::getline(lines, line); ++frames) {
+    const nlohmann::json truth = nlohmann::json::parse(line);
+    EXPECT_EQ(truth.at("frame"), frames);
+    int pixels = 0;
+    for (const nlohmann::json& run : truth.at("mask").at("runs_row_begin_end"))
+      pixels += run.at(2).get<int>() - run.at(1).get<int>();
+    // 13 m at 300 km are 30 px.
+    EXPECT_GT(pixels, 100);
+    EXPECT_EQ(truth.at("mask_px"), pixels);
+    EXPECT_EQ(truth.at("visible_fraction"), 1.0);
+  }
+  EXPECT_EQ(frames, 6);
+  const nlohmann::json coco = nlohmann::json::parse(content_of(latest / "coco.json"));
+  ASSERT_EQ(coco.at("images").size(), 3U);
+  EXPECT_EQ(coco.at("annotations").size(), 3U);
+  for (const nlohmann::json& image : coco.at("images"))
+    EXPECT_TRUE(fs::exists(latest / image.at("file_name")));
+  EXPECT_EQ(table_of(latest / "detections.csv").size(), 7U);
+}
+
 TEST(StarloopRun, BadInputIsTwoAndSaysWhatIsWrong) {
   const TemporaryFolder folder;
   struct Case {

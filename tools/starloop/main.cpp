@@ -57,12 +57,24 @@ int run_command(int argc, char** argv) {
   render_app->add_option("--out", render.out, "FITS file; the PNG goes beside it")
       ->capture_default_str();
 
+  starloop::ReplayOptions replay;
+  CLI::App* replay_app = app.add_subcommand(
+      "replay", "Run a recorded pass again from its log alone and compare every frame");
+  replay_app->add_option("log", replay.log, "record.slog, or a folder that has one")->required();
+  replay_app->add_option("--threads", replay.threads, "that render; default: one a processor")
+      ->check(CLI::Range(1, 256));
+  replay_app->add_option("--out", replay.out, "folder that gets the frames again");
+  replay_app->add_option("--frames", replay.frames, "how --out keeps them; default: png")
+      ->check(CLI::IsMember({"png", "fits", "cube", "raw"}));
+  replay_app->add_flag("-q,--quiet", replay.quiet, "print results and complaints only");
+
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? starloop::kGood : starloop::kBadInput;
   }
   if (run_app->parsed()) return starloop::run_pass(common, run);
+  if (replay_app->parsed()) return starloop::replay_log(replay);
   if (passes_app->parsed()) return starloop::list_passes(common, json);
   return starloop::render_frame(common, render);
 }

@@ -52,11 +52,12 @@ int open_pipe(const Scenario& scenario) {
 
 }  // namespace
 
-Pacing::Pacing(const Scenario& scenario, engine::SimTime start, Duration lasts)
+Pacing::Pacing(const Scenario& scenario, engine::SimTime start, Duration lasts, bool open_loop)
     : run_(scenario.run),
       realtime_(scenario.realtime),
       spec_(starloop::loop_spec(scenario, start, lasts)),
       pipe_(open_pipe(scenario)) {
+  spec_.open_loop = open_loop;
   if (run_.clock == ClockMode::kRealtime && realtime_.priority > 0)
     spec_.service_priority = realtime_.priority + 1;
   if (run_.clock == ClockMode::kTriggered) {

@@ -14,7 +14,7 @@ namespace starloop {
 class Pacing {
  public:
   /// Opens the pipe that pulls the trigger, if there is one. Throws engine::ConfigError.
-  Pacing(const Scenario& scenario, engine::SimTime start, engine::Duration lasts);
+  Pacing(const Scenario& scenario, engine::SimTime start, engine::Duration lasts, bool open_loop);
   ~Pacing();
   Pacing(const Pacing&) = delete;
   Pacing& operator=(const Pacing&) = delete;

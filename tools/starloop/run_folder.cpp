@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include "engine/core/constants.h"
+#include "engine/orbit/utc.h"
 #include "tools/starloop/picture.h"
 
 namespace starloop {
@@ -20,67 +21,47 @@ namespace starloop {
 namespace fs = std::filesystem;
 using engine::seconds;
 
-PngRecorder::PngRecorder(fs::path folder, std::uint64_t every, int width_px, int height_px,
-                         hil::WhenBusy when_busy)
-    : folder_(std::move(folder)), every_(every), when_busy_(when_busy) {
-  for (std::size_t i = 0; i < kSlots; ++i) {
-    slots_[i].pixels.resize(width_px, height_px);
-    ENSURE(free_.push(i));
-  }
-  free_count_.release(kSlots);
-  writer_ = std::jthread([this] { write_pictures(); });
+void PngStore::put(const hil::Frame& frame) {
+  write_png((folder_ / hil::frame_name(frame.sequence, "png")).string(), *frame.pixels, frame.bits);
 }
 
-PngRecorder::~PngRecorder() { finish(); }
-
-void PngRecorder::finish() {
-  if (!writer_.joinable()) return;
-  done_ = true;
-  ready_count_.release();
-  writer_.join();
+std::unique_ptr<hil::FrameStore> make_store(const fs::path& folder, const Scenario& s,
+                                            RecordFrames frames) {
+  const std::vector<engine::FitsCard> run = {
+      {"ORIGIN", "Starloop", "program that made this"},
+      {"SCENARIO", s.name, "scenario"},
+      {"DATEREF", engine::utc_text(s.scene.epoch), "epoch of all times, UTC"},
+      {"SEED", static_cast<long long>(s.scene.seed), "of all random numbers"},
+      {"BUNIT", "DN", "digital numbers"},
+      {"GAIN", s.detector.gain_e_dn(), "[e-/DN]"},
+      {"SATURATE", static_cast<long long>(s.detector.largest_dn()), "[DN] largest value"},
+  };
+  const engine::CameraGeometry& camera = s.scene.camera;
+  switch (frames) {
+    case RecordFrames::kPng:
+      return std::make_unique<PngStore>(folder);
+    case RecordFrames::kFits:
+      return std::make_unique<hil::FitsStore>(folder.string(), run);
+    case RecordFrames::kCube:
+      return std::make_unique<hil::CubeStore>((folder / "frames.fits").string(), camera.width_px,
+                                              camera.height_px, run);
+    case RecordFrames::kRaw:
+      return std::make_unique<hil::RawStore>((folder / "frames.slog").string(), s.run.sync_every);
+    case RecordFrames::kNone:
+      break;
+  }
+  return nullptr;
 }
 
-engine::Status PngRecorder::send(const hil::Frame& frame, engine::Duration timeout) noexcept {
-  if (frame.sequence % every_ != 0) return engine::Done{};
-  const bool free = when_busy_ == hil::WhenBusy::kWait ? free_count_.try_acquire_for(timeout)
-                                                       : free_count_.try_acquire();
-  std::size_t i = 0;
-  if (!free || !free_.pop(i)) {
-    ++left_out_;
-    return engine::Error{engine::Fault::kBusy, 0, "recorder"};
-  }
-  Slot& slot = slots_[i];
-  const auto pixels = frame.pixels->pixels();
-  ENSURE(pixels.size() == slot.pixels.pixels().size());
-  std::copy(pixels.begin(), pixels.end(), slot.pixels.pixels().begin());
-  slot.sequence = frame.sequence;
-  slot.bits = frame.bits;
-  ENSURE(ready_.push(i));
-  ready_count_.release();
-  return engine::Done{};
-}
-
-void PngRecorder::write_pictures() noexcept {
-  for (;;) {
-    ready_count_.acquire();
-    std::size_t i = 0;
-    if (!ready_.pop(i)) {
-      if (done_) return;
-      continue;
-    }
-    const Slot& slot = slots_[i];
-    char name[40];
-    std::snprintf(name, sizeof name, "frame_%06llu.png",
-                  static_cast<unsigned long long>(slot.sequence));
-    try {
-      write_png((folder_ / name).string(), slot.pixels, slot.bits);
-      ++written_;
-    } catch (const std::exception& e) {
-      std::fprintf(stderr, "starloop: %s\n", e.what());
-    }
-    ENSURE(free_.push(i));
-    free_count_.release();
-  }
+hil::LogStart log_start(const ScenarioSource& source, const Scenario& scenario,
+                        const hil::LoopSpec& loop, int threads) {
+  return {.program = "starloop " STARLOOP_VERSION,
+          .scenario_file = source.file,
+          .scenario = source.text,
+          .overrides = source.overrides,
+          .seed = scenario.scene.seed,
+          .threads = static_cast<std::uint32_t>(threads),
+          .loop = loop};
 }
 
 PointingScore score_pointing(const Scenario& scenario, const RunLog& log, double after_s) {
@@ -207,12 +188,14 @@ void write_tables(const fs::path& folder, const Scenario& scenario, const RunLog
   }
 }
 
-bool draw_pictures(const fs::path& folder, const std::string& compare) {
-  // Debian's own python3 is the one that has python3-matplotlib.
+namespace {
+
+/// A script of tools/plot, by Debian's own python3: the one that has python3-matplotlib.
+bool run_script(const char* name, const fs::path& folder, const std::string& more) {
   std::string python = "/usr/bin/python3";
-  std::string script = std::string(STARLOOP_SOURCE_DIR) + "/tools/plot/run_report.py";
+  std::string script = std::string(STARLOOP_SOURCE_DIR) + "/tools/plot/" + name;
   std::string where = folder.string();
-  std::string other = compare;
+  std::string other = more;
   char* arguments[] = {python.data(), script.data(), where.data(),
                        other.empty() ? nullptr : other.data(), nullptr};
   pid_t child = 0;
@@ -222,5 +205,13 @@ bool draw_pictures(const fs::path& folder, const std::string& compare) {
   }
   return WIFEXITED(status) && WEXITSTATUS(status) == 0;
 }
+
+}  // namespace
+
+bool draw_pictures(const fs::path& folder, const std::string& compare) {
+  return run_script("run_report.py", folder, compare);
+}
+
+bool write_page(const fs::path& folder) { return run_script("report_html.py", folder, ""); }
 
 }  // namespace starloop

@@ -1,57 +1,35 @@
 #pragma once
 
-#include <atomic>
 #include <filesystem>
+#include <memory>
 #include <optional>
-#include <semaphore>
 #include <string>
-#include <thread>
 #include <vector>
 
-#include "hil/camera_link.h"
 #include "hil/faults/fault_record.h"
 #include "hil/frame_loop.h"
-#include "hil/spsc_ring.h"
+#include "hil/recorder.h"
 #include "tools/starloop/scenario.h"
 
 namespace starloop {
 
-/// A sink that keeps every n-th frame as a PNG. It copies the frame and writes it on a thread of
-/// its own; when the disk is slow a picture is left out and counted, and nobody waits.
-class PngRecorder final : public hil::FrameSink {
+/// Keeps frames as PNGs, a file each.
+class PngStore final : public hil::FrameStore {
  public:
-  PngRecorder(std::filesystem::path folder, std::uint64_t every, int width_px, int height_px,
-              hil::WhenBusy when_busy);
-  ~PngRecorder() override;
-
-  engine::Status send(const hil::Frame& frame, engine::Duration timeout) noexcept override;
-  /// Writes what is still waiting. After that no frame is taken any more.
-  void finish();
-  [[nodiscard]] std::uint64_t written() const noexcept { return written_; }
-  [[nodiscard]] std::uint64_t left_out() const noexcept { return left_out_; }
+  explicit PngStore(std::filesystem::path folder) : folder_(std::move(folder)) {}
+  void put(const hil::Frame& frame) override;
 
  private:
-  static constexpr std::size_t kSlots = 4;
-  struct Slot {
-    engine::DnImage pixels;
-    std::uint64_t sequence = 0;
-    int bits = 11;
-  };
-  void write_pictures() noexcept;
-
   std::filesystem::path folder_;
-  std::uint64_t every_;
-  hil::WhenBusy when_busy_;
-  std::array<Slot, kSlots> slots_;
-  std::atomic<bool> done_{false};
-  hil::SpscRing<std::size_t, kSlots> ready_;  // sender -> writer
-  hil::SpscRing<std::size_t, kSlots> free_;   // writer -> sender
-  std::counting_semaphore<> ready_count_{0};
-  std::counting_semaphore<> free_count_{0};
-  std::uint64_t left_out_ = 0;  // the sender's own
-  std::uint64_t written_ = 0;   // the writer's own until it is joined
-  std::jthread writer_;
 };
+
+/// Where the frames of a run are kept, as record.frames says; null for none.
+[[nodiscard]] std::unique_ptr<hil::FrameStore> make_store(const std::filesystem::path& folder,
+                                                          const Scenario& scenario,
+                                                          RecordFrames frames);
+/// How a log of this run begins.
+[[nodiscard]] hil::LogStart log_start(const ScenarioSource& source, const Scenario& scenario,
+                                      const hil::LoopSpec& loop, int threads);
 
 /// What is known of a run once it is over.
 struct RunLog {
@@ -82,5 +60,7 @@ void write_tables(const std::filesystem::path& folder, const Scenario& scenario,
 /// The contact sheet and the plot, by tools/plot/run_report.py; false when python3 or matplotlib
 /// is not there.
 [[nodiscard]] bool draw_pictures(const std::filesystem::path& folder, const std::string& compare);
+/// report.html, by tools/plot/report_html.py, of what is in the folder by now; false as above.
+[[nodiscard]] bool write_page(const std::filesystem::path& folder);
 
 }  // namespace starloop

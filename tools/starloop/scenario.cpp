@@ -7,6 +7,7 @@
 #include "engine/orbit/utc.h"
 #include "engine/scene/telescope.h"
 #include "hil/steady_clock.h"
+#include "hil/telemetry_row.h"
 
 namespace starloop {
 namespace {
@@ -60,6 +61,16 @@ RunSpec read_run(const ConfigTable& table) {
   return run;
 }
 
+void read_record(const ConfigTable& table, RunSpec& run) {
+  run.record_frames = table.choice_or<RecordFrames>("frames", "png",
+                                                    {{"none", RecordFrames::kNone},
+                                                     {"png", RecordFrames::kPng},
+                                                     {"fits", RecordFrames::kFits},
+                                                     {"cube", RecordFrames::kCube},
+                                                     {"raw", RecordFrames::kRaw}});
+  run.sync_every = from_seconds(table.number_or("sync_s", 5.0, engine::between(0.0, 3600.0)));
+}
+
 tracker::TrackerSpec read_tracker(const ConfigTable& table, const engine::CameraGeometry& camera) {
   tracker::TrackerSpec spec;
   spec.ifov_rad = camera.ifov_rad();
@@ -104,9 +115,11 @@ Scenario read_scenario(const ConfigReader& config) {
       "light_path", "apparent",
       {{"apparent", engine::LightPath::kApparent}, {"geometric", engine::LightPath::kGeometric}});
   s.run = read_run(config.table("run"));
+  read_record(config.table("record"), s.run);
   const ConfigTable criteria = config.table("criteria");
   s.criteria = {criteria.number_or("pointing_rms_px", 0.0, engine::at_least(0.0)),
-                criteria.number_or("after_s", 0.0, engine::at_least(0.0))};
+                criteria.number_or("after_s", 0.0, engine::at_least(0.0)),
+                hil::read_criteria(criteria)};
   s.camera_orbit = engine::read_elements(config.table("orbit.camera"));
   s.target_orbit = engine::read_elements(config.table("orbit.target"));
 
@@ -131,24 +144,43 @@ Scenario read_scenario(const ConfigReader& config) {
   s.detector = engine::read_detector(config.table("detector"), s.scene.camera.pixel_pitch_m,
                                      s.scene.sun.mean_wavelength_m);
   s.guidance = hil::read_guidance_error(config.table("guidance"));
+  s.mode = hil::read_guidance_mode(config.table("guidance"));
+  s.target_knowledge = hil::read_target_knowledge(config.table("guidance"));
   s.roll = config.table("guidance")
                .choice_or<hil::RollRule>("roll", "celestial",
                                          {{"celestial", hil::RollRule::kCelestial},
                                           {"vertical", hil::RollRule::kVertical}});
   s.actuator = hil::read_actuator(config.table("actuator"));
   s.realtime = hil::read_realtime(config.table("realtime"));
+  s.link = drivers::read_link(config.table("link"));
+  if (s.link.telemetry_row &&
+      (s.scene.camera.width_px < static_cast<int>(hil::kTelemetryRowPixels) ||
+       s.detector.bits < hil::kTelemetryRowBits)) {
+    config.table("link").fail("telemetry_row", "needs a camera of at least 52 columns and 8 bits");
+  }
+  s.port = hil::read_command_port(config.table("command_port"));
   s.faults = hil::read_faults(config, s.scene.seed, s.scene.camera.width_px, s.detector.bits);
+  s.jitter = hil::read_jitter(config);
+  s.sensors = hil::read_sensors(config.table("sensors"));
   s.tracker = read_tracker(config.table("tracker"), s.scene.camera);
   config.reject_unknown_keys();
   return s;
 }
 
-Scenario load_scenario(const CommonOptions& options) {
-  ConfigReader config = ConfigReader::from_file(options.file);
-  for (const std::string& assignment : options.overrides) config.set(assignment);
-  if (options.seed_given) config.set("scenario.seed=" + std::to_string(options.seed));
+ScenarioSource read_source(const CommonOptions& options) {
+  ScenarioSource source{options.file, engine::scenario_text(options.file), options.overrides};
+  if (options.seed_given)
+    source.overrides.push_back("scenario.seed=" + std::to_string(options.seed));
+  return source;
+}
+
+Scenario load_scenario(const ScenarioSource& source) {
+  ConfigReader config = ConfigReader::from_text(source.text, source.file);
+  for (const std::string& assignment : source.overrides) config.set(assignment);
   return read_scenario(config);
 }
+
+Scenario load_scenario(const CommonOptions& options) { return load_scenario(read_source(options)); }
 
 Rig::Rig(const Scenario& scenario, int threads)
     : epoch_(scenario.scene.epoch),
@@ -156,6 +188,7 @@ Rig::Rig(const Scenario& scenario, int threads)
       roll_(scenario.roll),
       camera_(scenario.camera_orbit, epoch_),
       target_(scenario.target_orbit, epoch_),
+      believed_target_(target_, scenario.target_knowledge),
       pool_(worker_threads(threads)) {
   const engine::DetectorSpec& detector = scenario.detector;
   const double dark_e = detector.dark_e_s * engine::seconds(scenario.run.exposure);
@@ -180,6 +213,22 @@ Rig::Rig(const Scenario& scenario, int threads)
 }
 
 hil::ScriptedPointing Rig::prediction() const { return {camera_, target_, epoch_, path_, roll_}; }
+
+hil::ScriptedPointing Rig::believed() const {
+  return {camera_, believed_target_, epoch_, path_, roll_};
+}
+
+hil::ClosedLoopPointing make_pointing(const Scenario& scenario, const Rig& rig,
+                                      engine::SimTime start) {
+  hil::PointingSpec spec;
+  spec.mode = scenario.mode;
+  spec.error = scenario.guidance;
+  spec.error.start = start;
+  spec.actuator = scenario.actuator;
+  spec.sensors = scenario.sensors;
+  spec.seed = scenario.scene.seed;
+  return {rig.believed(), spec, hil::Jitter(scenario.jitter, spec.seed, start)};
+}
 
 std::vector<engine::Pass> passes_of(const Scenario& scenario) {
   const engine::Epoch epoch = scenario.scene.epoch;

@@ -1,18 +1,22 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "drivers/open_link.h"
 #include "engine/imaging_chain.h"
 #include "engine/orbit/kepler.h"
 #include "engine/orbit/visibility.h"
 #include "engine/render/path_tracer.h"
 #include "engine/scene/brdf.h"
 #include "hil/closed_loop_pointing.h"
+#include "hil/command_port.h"
 #include "hil/faults/fault_spec.h"
 #include "hil/frame_loop.h"
 #include "hil/realtime.h"
+#include "hil/score.h"
 #include "tools/tracker/tracker.h"
 
 namespace starloop {
@@ -23,6 +27,9 @@ enum class ClockMode : std::uint8_t {
   kAsFastAsPossible,  ///< each frame waits for the link alone
   kTriggered,         ///< each frame waits for a pull from outside
 };
+
+/// How frames are kept.
+enum class RecordFrames : std::uint8_t { kNone, kPng, kFits, kCube, kRaw };
 
 /// How a run goes: when, how fast, what is kept.
 struct RunSpec {
@@ -39,11 +46,14 @@ struct RunSpec {
   engine::Duration trigger_timeout{};
   engine::Duration start_timeout{};  ///< how long the start waits for the software under test
   std::uint64_t record_every = 10;
+  RecordFrames record_frames = RecordFrames::kPng;
+  engine::Duration sync_every{};  ///< of the logs: what a power cut may cost
 };
 
 struct Criteria {
   double pointing_rms_px = 0;  ///< 0: none
   double after_s = 0;
+  hil::DetectionCriteria detection;
 };
 
 /// All Specs of a run, as the rooms have read and checked them.
@@ -63,10 +73,16 @@ struct Scenario {
   engine::OpticsSpec optics;
   engine::DetectorSpec detector;
   hil::GuidanceError guidance;
+  hil::GuidanceMode mode = hil::GuidanceMode::kPredictedTarget;
+  hil::TargetKnowledge target_knowledge;
   hil::RollRule roll = hil::RollRule::kCelestial;
   hil::ActuatorSpec actuator;
   hil::RealtimeSpec realtime;
+  drivers::LinkSpec link;
+  std::optional<hil::CommandPortSpec> port;
   hil::FaultSpec faults;
+  hil::JitterSpec jitter;
+  hil::SensorSpec sensors;
   tracker::TrackerSpec tracker;
 };
 
@@ -80,7 +96,16 @@ struct CommonOptions {
   std::uint64_t seed = 0;
 };
 
-/// Throws engine::ConfigError.
+/// What a scenario is read from: enough to read it again without the file.
+struct ScenarioSource {
+  std::string file;  ///< for complaints
+  std::string text;
+  std::vector<std::string> overrides;  ///< with --seed among them
+};
+
+/// All throw engine::ConfigError.
+[[nodiscard]] ScenarioSource read_source(const CommonOptions& options);
+[[nodiscard]] Scenario load_scenario(const ScenarioSource& source);
 [[nodiscard]] Scenario load_scenario(const CommonOptions& options);
 [[nodiscard]] Scenario read_scenario(const engine::ConfigReader& config);
 
@@ -90,7 +115,10 @@ class Rig {
   Rig(const Scenario& scenario, int threads);
 
   [[nodiscard]] engine::ImagingChain& chain() noexcept { return *chain_; }
+  /// Without an error.
   [[nodiscard]] hil::ScriptedPointing prediction() const;
+  /// As far as the target's orbit is known.
+  [[nodiscard]] hil::ScriptedPointing believed() const;
   [[nodiscard]] const engine::KeplerPropagator& camera() const noexcept { return camera_; }
   [[nodiscard]] const engine::KeplerPropagator& target() const noexcept { return target_; }
   [[nodiscard]] int threads() const noexcept { return pool_.threads(); }
@@ -102,10 +130,15 @@ class Rig {
   hil::RollRule roll_;
   engine::KeplerPropagator camera_;
   engine::KeplerPropagator target_;
+  hil::BelievedTarget believed_target_;
   engine::WorkerPool pool_;
   std::size_t triangles_ = 0;
   std::unique_ptr<engine::ImagingChain> chain_;
 };
+
+/// The camera that obeys, in a run that starts at `start`. The rig outlives it.
+[[nodiscard]] hil::ClosedLoopPointing make_pointing(const Scenario& scenario, const Rig& rig,
+                                                    engine::SimTime start);
 
 [[nodiscard]] std::vector<engine::Pass> passes_of(const Scenario& scenario);
 

@@ -27,4 +27,14 @@ struct RunOptions {
 /// Runs a pass as a loop.
 int run_pass(const CommonOptions& options, const RunOptions& run);
 
+struct ReplayOptions {
+  std::string log;  ///< record.slog, or the folder it is in
+  int threads = 0;  ///< 0: one for each processor
+  std::string out;  ///< the folder that gets the frames again; empty: none
+  std::string frames = "png";
+  bool quiet = false;
+};
+/// Runs what a log recorded again and compares every frame.
+int replay_log(const ReplayOptions& options);
+
 }  // namespace starloop

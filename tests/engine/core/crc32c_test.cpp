@@ -54,4 +54,13 @@ TEST(Crc32c, AgreesWithTheBitwiseFormAtEveryLengthAndAlignment) {
   }
 }
 
+TEST(Crc32c, OfTwoPartsInTurnIsThatOfTheWhole) {
+  std::mt19937 random(2);
+  std::vector<std::byte> bytes(50);
+  for (std::byte& b : bytes) b = static_cast<std::byte>(random());
+  const std::span<const std::byte> all(bytes);
+  for (std::size_t cut = 0; cut <= bytes.size(); ++cut)
+    EXPECT_EQ(crc32c(all.subspan(cut), crc32c(all.first(cut))), bitwise(all)) << cut;
+}
+
 }  // namespace

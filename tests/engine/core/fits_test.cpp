@@ -1,6 +1,7 @@
 #include "engine/core/fits.h"
 
 #include <algorithm>
+#include <bit>
 #include <fstream>
 #include <iterator>
 #include <stdexcept>
@@ -65,6 +66,54 @@ TEST(Fits, TakesNamesLiterally) {
   const TempFile file("a[1:2,1:2].fits");
   write_fits(file.path(), ramp(8, 8), {});
   EXPECT_EQ(read_fits(file.path()).width(), 8);
+}
+
+// Read without our code: FITS 4.0, sections 3.3 and 7.3. Blocks of 2880 bytes, numbers big-endian,
+// unsigned pixels stored less 32768.
+TEST(FitsCube, HoldsEveryPlaneAndARowOfNumbersForEach) {
+  constexpr std::size_t kBlock = 2880;
+  const TempFile file("cube.fits");
+  FitsCube cube(file.path(), 7, 3, {{"SEED", 42LL, ""}});
+  for (std::uint16_t k = 0; k < 150; ++k) {
+    DnImage plane(7, 3);
+    for (std::size_t i = 0; i < 21; ++i)
+      plane.pixels()[i] = static_cast<std::uint16_t>(k * 400U + i);
+    cube.add(plane, {{"FRAMENO", 10LL * k, "number"}, {"TIME", 0.5 * k, "[s]"}});
+    EXPECT_FALSE(std::ifstream(file.path()).good()) << "half a cube under its name";
+  }
+  cube.close();
+  EXPECT_FALSE(std::ifstream(file.path() + ".part").good());
+
+  const std::string bytes = bytes_of(file.path());
+  ASSERT_EQ(bytes.size() % kBlock, 0U);
+  EXPECT_NE(bytes.find("NAXIS3  =                  150"), std::string::npos);
+  EXPECT_NE(bytes.find("SEED    =                   42"), std::string::npos);
+  const auto number = [&bytes](std::size_t at, std::size_t width) {
+    std::uint64_t n = 0;
+    for (std::size_t i = 0; i < width; ++i) n = n << 8 | static_cast<unsigned char>(bytes[at + i]);
+    return n;
+  };
+  const std::size_t data = kBlock;  // the header is one block
+  for (std::size_t k = 0; k < 150; ++k)
+    for (std::size_t i = 0; i < 21; ++i)
+      ASSERT_EQ(number(data + 2 * (21 * k + i), 2) ^ 0x8000U, k * 400 + i) << k << " " << i;
+  const std::size_t table = data + (2 * 21 * 150 + kBlock - 1) / kBlock * kBlock;
+  EXPECT_EQ(bytes.substr(table, 20), "XTENSION= 'BINTABLE'");
+  EXPECT_NE(bytes.find("'FRAMENO", table), std::string::npos);
+  for (std::size_t k = 0; k < 150; ++k) {
+    const std::size_t row = table + kBlock + 16 * k;
+    ASSERT_EQ(number(row, 8), 10 * k);
+    ASSERT_EQ(std::bit_cast<double>(number(row + 8, 8)), 0.5 * static_cast<double>(k));
+  }
+}
+
+TEST(FitsCube, WithoutPlanesIsNoFileAndAPlaceThatIsNoneIsRefused) {
+  const TempFile file("empty_cube.fits");
+  FitsCube cube(file.path(), 4, 4, {});
+  cube.close();
+  EXPECT_FALSE(std::ifstream(file.path()).good());
+  EXPECT_FALSE(std::ifstream(file.path() + ".part").good());
+  EXPECT_THROW(FitsCube("/nowhere/x.fits", 4, 4, {}), std::runtime_error);
 }
 
 TEST(Fits, RefusesWhatIsNoImageOfItsKind) {

@@ -121,5 +121,41 @@ TEST(Footprint, HoldsATriangleThatIsPartlyBehindTheCamera) {
   EXPECT_GT(seen, 0);
 }
 
+/// A plate of so many pixels' side that faces a camera of 64 x 64 pixels, its middle at a place.
+double visible_fraction_of_plate(double side_px, PixelPoint middle) {
+  const CameraGeometry camera = small_camera(64);
+  constexpr double kRange_m = 1e5;
+  const double m_per_px = kRange_m * camera.ifov_rad();
+  // Seen from +z with y up, u grows with x and v against y.
+  const Vector3d corner((middle.u - 32.0 - 0.5 * side_px) * m_per_px,
+                        -(middle.v - 32.0 + 0.5 * side_px) * m_per_px, 0.0);
+  const auto side_m = static_cast<float>(side_px * m_per_px);
+  Mesh mesh;
+  test_support::add_plate(mesh, "white", corner.cast<float>(), {side_m, 0, 0}, {0, side_m, 0});
+  Footprint footprint(camera, kBeyond_px, mesh.vertices.size());
+  footprint.project(mesh, look_at_origin({0, 0, kRange_m}, {0, 1, 0}));
+  return footprint.visible_fraction();
+}
+
+TEST(Footprint, TellsWhichShareOfThePlateLiesInTheFrame) {
+  // The frame reaches from -0.5 to 63.5. Floats carry corners to 1e-6 px here.
+  EXPECT_EQ(visible_fraction_of_plate(20, {32, 32}), 1.0);
+  EXPECT_NEAR(visible_fraction_of_plate(20, {-0.5, 32}), 0.5, 1e-5);
+  EXPECT_NEAR(visible_fraction_of_plate(20, {32, 63.5}), 0.5, 1e-5);
+  EXPECT_NEAR(visible_fraction_of_plate(20, {63.5, -0.5}), 0.25, 1e-5);
+  EXPECT_NEAR(visible_fraction_of_plate(20, {-7.5, 68.5}), 0.15 * 0.25, 1e-5);
+  // Cut by all four edges, and no corner inside.
+  EXPECT_NEAR(visible_fraction_of_plate(200, {32, 32}), 0.32 * 0.32, 1e-5);
+  EXPECT_EQ(visible_fraction_of_plate(20, {80, 32}), 0.0);
+  EXPECT_EQ(visible_fraction_of_plate(20, {-300, -300}), 0.0);
+}
+
+TEST(Footprint, SeesNothingOfWhatIsBehindTheCamera) {
+  const Mesh mesh = test_support::sphere(2.0F, 8, 12, "white");
+  Footprint footprint(small_camera(64), kBeyond_px, mesh.vertices.size());
+  footprint.project(mesh, test_support::view_from({0, 0, 1e5}, {0, 0, 1}, {0, 1, 0}));
+  EXPECT_EQ(footprint.visible_fraction(), 0.0);
+}
+
 }  // namespace
 }  // namespace engine

@@ -184,19 +184,19 @@ TEST(PathTracer, ShadowHidesOneLampAndLeavesTheOther) {
 }
 
 /// A ball of many facets, as it is and with every third face turned inside out.
-std::pair<Rendered, Rendered> clean_and_flipped(const Brdf& brdf) {
+std::pair<Rendered, Rendered> clean_and_flipped(const FiveParameters& surface) {
   const Mesh mesh = test_support::sphere(5.0F, 24, 48, "white");
   Mesh flipped = mesh;
   for (std::size_t i = 0; i < flipped.triangles.size(); i += 3)
     std::swap(flipped.triangles[i].corner[1], flipped.triangles[i].corner[2]);
   Snapshot snapshot = look_at_origin({60e3, 70e3, -40e3}, {0, 0, 1});
   snapshot.sun = {toward({1, 1, -1}), kSun_w_m2};
-  return {render(spec_of(96), mesh, {{"white", brdf}}, snapshot),
-          render(spec_of(96), flipped, {{"white", brdf}}, snapshot)};
+  return {render(spec_of(96), mesh, {{"white", surface}}, snapshot),
+          render(spec_of(96), flipped, {{"white", surface}}, snapshot)};
 }
 
 TEST(PathTracer, FlippedFacesMakeTheSameImage) {
-  const auto [a, b] = clean_and_flipped(Brdf(test_support::lambert(0.3), Brdf::Variant::kPhysical));
+  const auto [a, b] = clean_and_flipped(test_support::lambert(0.3));
   ASSERT_EQ(a.light.grid.pixels().size(), b.light.grid.pixels().size());
   ASSERT_GT(a.sum(), 0.0);
   // Smoothing moves the normals of a flipped facet's neighbours: nothing for a Lambert surface but
@@ -205,7 +205,7 @@ TEST(PathTracer, FlippedFacesMakeTheSameImage) {
 }
 
 TEST(PathTracer, FlippedFacesMakeTheSameGlint) {
-  const auto [a, b] = clean_and_flipped(Brdf(test_support::polyimide(), Brdf::Variant::kPhysical));
+  const auto [a, b] = clean_and_flipped(test_support::polyimide());
   ASSERT_EQ(a.light.grid.pixels().size(), b.light.grid.pixels().size());
   EXPECT_NEAR(b.sum() / a.sum(), 1.0, 1e-4);
   const float brightest = *std::ranges::max_element(a.light.grid.pixels());
@@ -214,12 +214,12 @@ TEST(PathTracer, FlippedFacesMakeTheSameGlint) {
 
 TEST(PathTracer, FacetedBallsGlintIsThatOfASmoothOne) {
   // Fine facets, narrower than the lobe, need no smoothing: the coarse ball must be as bright.
-  const Brdf brdf(test_support::polyimide(), Brdf::Variant::kPhysical);
+  const FiveParameters surface = test_support::polyimide();
   Snapshot snapshot = look_at_origin({60e3, 70e3, -40e3}, {0, 0, 1});
   snapshot.sun = {toward({1, 1, -1}), kSun_w_m2};
   const auto light = [&](int rings) {
     return render(spec_of(96), test_support::sphere(5.0F, rings, 2 * rings, "white"),
-                  {{"white", brdf}}, snapshot)
+                  {{"white", surface}}, snapshot)
         .sum();
   };
   // The requirement on a smoothed glint: 5 %.

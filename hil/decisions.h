@@ -1,0 +1,22 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "hil/frame_loop.h"
+
+namespace hil {
+
+/// What a clock, a link and the software under test decided in a run: with scenario and seed, all
+/// that its pixels depend on. A loop that is given them asks nobody else.
+struct Decisions {
+  /// A frame that the loop came to. One that is missing was skipped.
+  struct Due {
+    std::uint64_t frame = 0;
+    bool exposed = false;  ///< false: dropped; commands were obeyed all the same
+  };
+  std::vector<Due> due;                 ///< by frame, ascending
+  std::vector<CommandRecord> commands;  ///< in the order in which they were obeyed
+};
+
+}  // namespace hil
