@@ -151,6 +151,73 @@ TEST(Lockstep, AnAnswerInSeveralPacketsIsWholeWithTheLast) {
     EXPECT_EQ(r.frame, r.command.answers_frame + 1);
 }
 
+/// Numbered by hand: the fakes' queue numbers what it is given.
+class HandNumbered final : public hil::CommandSource {
+ public:
+  explicit HandNumbered(std::vector<Command> commands) : commands_(std::move(commands)) {}
+  engine::Expected<Command> receive(Duration timeout) noexcept override {
+    if (next_ < commands_.size()) return commands_[next_++];
+    done_ = true;
+    return never_.receive(timeout);
+  }
+  [[nodiscard]] bool done() const noexcept { return done_; }
+
+ private:
+  std::vector<Command> commands_;
+  std::size_t next_ = 0;
+  std::atomic<bool> done_{false};
+  fakes::SilentSource never_;
+};
+
+Command trim_to(double offset_rad, std::uint64_t sequence) {
+  Command c;
+  c.sequence = sequence;
+  c.kind = CommandKind::kTrim;
+  c.trim_offset_rad = {offset_rad, 0.0};
+  return c;
+}
+
+/// The pixels' own trim in the last frame, after the loop has heard `commands` before it.
+double last_seen(const std::vector<Command>& commands, LoopReport& report, bool open_loop = false) {
+  Rig rig;
+  HandNumbered source(commands);
+  double seen = 0;
+  fakes::PixelGenerator generator([&](const engine::Shot& shot) {
+    // All are in before the second frame.
+    while (shot.sequence == 0 && !source.done()) std::this_thread::yield();
+    seen = shot.attitude.middle.axes.matrix(0, 0);
+  });
+  LoopSpec spec = patient_loop(3);
+  spec.open_loop = open_loop;
+  FrameLoop loop(spec, rig.clock, rig.pointing, generator, rig.sink, source);
+  report = loop.run({});
+  return seen;
+}
+
+TEST(LoopGate, ADuplicateALateAndAStaleCommandChangeNothingAndAreCountedByCause) {
+  Command stale = trim_to(4.0, 12);
+  stale.made_at = kStart - 10 * kPeriod;
+  stale.time_to_live = kMillisecond;
+  Command from_the_future = trim_to(5.0, 13);
+  from_the_future.made_at = kStart + std::chrono::hours(1);
+  LoopReport report;
+  const double seen = last_seen(
+      {trim_to(1.0, 10), trim_to(2.0, 10), trim_to(3.0, 9), stale, from_the_future}, report);
+  EXPECT_EQ(seen, 1.0);
+  EXPECT_EQ(report.commands, 1U);
+  for (const hil::Refusal cause : {hil::Refusal::kDuplicate, hil::Refusal::kReordered,
+                                   hil::Refusal::kStale, hil::Refusal::kFuture})
+    EXPECT_EQ(report.refused[cause], 1U) << name(cause);
+  EXPECT_EQ(report.refused.total(), 4U);
+}
+
+TEST(OpenLoop, ATrimCountsAsAReport) {
+  LoopReport report;
+  EXPECT_EQ(last_seen({trim_to(1.0, 1)}, report, true), 0.0);
+  EXPECT_EQ(report.commands, 1U);
+  EXPECT_EQ(last_seen({trim_to(1.0, 1)}, report, false), 1.0);
+}
+
 TEST(LateFrames, AFrameThatTookTooLongIsOurOwnDoing) {
   Rig rig;
   fakes::PixelGenerator generator([&rig](const engine::Shot& shot) {
