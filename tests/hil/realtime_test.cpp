@@ -39,21 +39,31 @@ TEST(Realtime, WhatItSaysWasGrantedIsWhatTheSystemKeeps) {
             0);
 }
 
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+// A sanitizer answers mlockall() itself, with success, and locks nothing.
+constexpr bool kLocksForReal = false;
+#else
+constexpr bool kLocksForReal = true;
+#endif
+
 TEST(Realtime, ARefusalIsSaidAndIsNoError) {
-  EXPECT_EQ(
-      in_a_child([] {
-        // Nobody may lock memory or have a priority, root neither once it is another user.
-        const rlimit none{0, 0};
-        setrlimit(RLIMIT_MEMLOCK, &none);
-        setrlimit(RLIMIT_RTPRIO, &none);
-        if (getuid() == 0 && setuid(65534) != 0) return 1;
-        const RealtimeGrant grant = hil::enter_realtime({.priority = 7, .core = 1023});
-        if (grant.priority != 0 || grant.memory_locked || grant.core != -1) return 2;
-        for (const char* part : {"priority 7 refused (", "memory refused (", "core 1023 refused ("})
-          if (grant.text.find(part) == std::string::npos) return 3;
-        return 0;
-      }),
-      0);
+  EXPECT_EQ(in_a_child([] {
+              // Nobody may lock memory or have a priority, root neither once it is another user.
+              const rlimit none{0, 0};
+              setrlimit(RLIMIT_MEMLOCK, &none);
+              setrlimit(RLIMIT_RTPRIO, &none);
+              if (getuid() == 0 && setuid(65534) != 0) return 1;
+              const RealtimeGrant grant = hil::enter_realtime({.priority = 7, .core = 1023});
+              if (grant.priority != 0 || grant.core != -1) return 2;
+              if (grant.memory_locked && kLocksForReal) return 4;
+              for (const char* part :
+                   {"priority 7 refused (", "memory refused (", "core 1023 refused ("}) {
+                const bool said = grant.text.find(part) != std::string::npos;
+                if (!said && (kLocksForReal || part[0] != 'm')) return 3;
+              }
+              return 0;
+            }),
+            0);
 }
 
 TEST(Realtime, WhatWasNotAskedForIsLeftAlone) {
