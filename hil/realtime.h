@@ -10,7 +10,7 @@ namespace hil {
 struct RealtimeSpec {
   int priority = 10;        ///< SCHED_FIFO, of the loop; 0: not asked for
   int core = -1;            ///< that the loop is pinned to; -1: any
-  bool lock_memory = true;  ///< all that set-up has allocated
+  bool lock_memory = true;  ///< all that set-up has allocated and touched
 };
 /// Keys `priority`, `core`, `lock_memory`, all optional.
 [[nodiscard]] RealtimeSpec read_realtime(const engine::ConfigTable& table);

@@ -11,6 +11,11 @@ using engine::SimTime;
 
 SteadyClock::SteadyClock(SimTime start) noexcept : start_(start), started_at_(stopwatch()) {}
 
+void SteadyClock::restart(SimTime start) noexcept {
+  start_ = start;
+  started_at_ = stopwatch();
+}
+
 Duration SteadyClock::stopwatch() noexcept {
   timespec t{};
   clock_gettime(CLOCK_MONOTONIC, &t);

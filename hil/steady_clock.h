@@ -10,6 +10,9 @@ class SteadyClock final : public Clock {
   /// `start` is the simulated time at this moment.
   explicit SteadyClock(engine::SimTime start) noexcept;
 
+  /// As if made now. Pre: no other thread reads it yet.
+  void restart(engine::SimTime start) noexcept;
+
   [[nodiscard]] engine::SimTime now() const noexcept override;
   engine::Duration sleep_until(engine::SimTime t) noexcept override;
 

@@ -65,4 +65,13 @@ TEST(SteadyClock, WakesNoEarlierThanAskedAndIsNeverEarly) {
   }
 }
 
+// A set-up that took long must not eat the first frames.
+TEST(SteadyClock, ARestartedClockStandsWhereItIsTold) {
+  hil::SteadyClock clock(engine::sim_time(100.0));
+  static_cast<void>(clock.sleep_until(engine::sim_time(100.0) + engine::Duration(5'000'000)));
+  clock.restart(engine::sim_time(50.0));
+  EXPECT_GE(clock.now(), engine::sim_time(50.0));
+  EXPECT_LT(clock.now(), engine::sim_time(100.0));
+}
+
 }  // namespace

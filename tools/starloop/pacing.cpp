@@ -98,15 +98,19 @@ void Pacing::start() {
     const int above_services = realtime_.priority > 0 ? realtime_.priority + 2 : 0;
     meter_ = std::make_unique<hil::HiccupMeter>(above_services);
     spec_.hiccups = meter_.get();
-    clock_ = std::make_unique<hil::SteadyClock>(spec_.start - kRunUp);
+    auto steady = std::make_unique<hil::SteadyClock>(spec_.start - kRunUp);
+    steady_ = steady.get();
+    clock_ = std::move(steady);
   } else {
     clock_ = std::make_unique<hil::ManualClock>(spec_.start - run_.period);
   }
 }
 
 std::string Pacing::enter_realtime() {
-  if (run_.clock != ClockMode::kRealtime) return {};
+  if (steady_ == nullptr) return {};
   grant_ = hil::enter_realtime(realtime_);
+  // However long that and the set-up before it took.
+  steady_->restart(spec_.start - kRunUp);
   return grant_.text;
 }
 

@@ -26,10 +26,11 @@ class Pacing {
   /// run is to be given up.
   [[nodiscard]] bool wait_for_reader(const hil::FrameSink& sink,
                                      const std::function<bool()>& give_up) const;
-  /// Clock and meter start here: call it when all is ready but the loop itself.
+  /// Makes clock and meter, for those who are set up with them.
   void start();
   [[nodiscard]] hil::Clock& clock() noexcept { return *clock_; }
-  /// What the system granted; empty unless the run keeps real time. The calling thread is the loop.
+  /// The run-up to the first shutter begins here: call it when all is ready. Returns what the
+  /// system granted; empty unless the run keeps real time. The calling thread is the loop.
   [[nodiscard]] std::string enter_realtime();
   /// Ends the meter, and gives back what was granted. Null: there was no meter.
   const hil::WakeHistogram* finish();
@@ -45,7 +46,8 @@ class Pacing {
   int pipe_ = -1;
   std::unique_ptr<hil::HiccupMeter> meter_;
   std::unique_ptr<hil::Clock> clock_;
-  std::jthread reader_;  // the last member: it uses the others
+  hil::SteadyClock* steady_ = nullptr;  ///< the same, in real time
+  std::jthread reader_;                 // the last member: it uses the others
 };
 
 }  // namespace starloop
