@@ -144,7 +144,8 @@ void Actuator::substep(const Wanted& wanted, const Transition& next) noexcept {
   const Wanted w{wanted.angle_rad, std::clamp(wanted.rate_rad_s, -most, most)};
   if (!step_between_limits(w, next)) step_at_limits(w, next);
   const double limit = spec_.angle_limit_rad;
-  if (std::abs(angle_rad_) > limit && std::abs(before_rad) <= limit)
+  // A limit of half a turn is none: what turns about all the way has no stop to run into.
+  if (limit < kPi && std::abs(angle_rad_) > limit && std::abs(before_rad) <= limit)
     place(std::copysign(limit, angle_rad_), 0.0);
 }
 

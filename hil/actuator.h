@@ -14,7 +14,7 @@ struct ActuatorSpec {
   double damping = 0.7;
   double rate_limit_rad_s = 2e-3;
   double acceleration_limit_rad_s2 = 10e-3;
-  double angle_limit_rad = engine::kPi;  ///< how far commands reach, either way
+  double angle_limit_rad = engine::kPi;  ///< how far commands reach, either way; pi: no stop there
   double command_step_rad = 0;  ///< offsets are rounded to multiples of it; 0: they are not
   engine::Duration delay{};     ///< from a command's arrival to its effect
   bool ideal = false;           ///< there at once: no dynamics, no limit but the angle's

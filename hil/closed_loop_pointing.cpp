@@ -18,8 +18,12 @@ using engine::SimTime;
 namespace {
 
 constexpr std::size_t kMostUnderWay = 1024;
-constexpr double kFastest_rad_s = 2.0 * kPi;
+constexpr double kFastest_rad_s = 2.0 * kPi;  // of a command
+// No line turns faster than one, nor does a camera that follows it: twice that is between them.
+constexpr double kFastestTurn_rad_s = 2.0 * kFastest_rad_s;
 constexpr Duration kInstant{1'000'000};  // over which rates are carried from line to line
+// The longest without a look at which way is the short one: at 2 pi a second a tenth of a turn.
+constexpr Duration kStretch{100'000'000};
 
 /// Tilting the boresight by x towards u and y towards v is a turn about -y and x.
 Vector3d turn_towards(double x_rad, double y_rad, double roll_rad) noexcept {
@@ -105,9 +109,11 @@ void ClosedLoopPointing::begin(SimTime t) noexcept {
 }
 
 void ClosedLoopPointing::advance_to(SimTime t) noexcept {
-  for (Actuator& axis : axes_) axis.advance_to(t);
-  now_ = t;
-  turn_the_short_way();
+  do {  // at the same instant too: an ideal actuator answers at once
+    now_ = std::min(now_ + kStretch, t);
+    for (Actuator& axis : axes_) axis.advance_to(now_);
+    turn_the_short_way();
+  } while (now_ < t);
 }
 
 void ClosedLoopPointing::apply(const Command& c) noexcept {
@@ -163,7 +169,10 @@ void ClosedLoopPointing::change_line(Set set) noexcept {
   const Vector3d turn = turn_of(held * guidance_.line(now_).axes.matrix.transpose());
   const Vector3d turn_soon =
       turn_near(turn_of(held_soon * guidance_.line(soon).axes.matrix.transpose()), turn);
-  place(turn, (turn_soon - turn) / instant_s);
+  Vector3d rate = (turn_soon - turn) / instant_s;
+  // A rotation vector's rate is not quite the camera's: many lines in turn can drive it up.
+  rate *= std::min(1.0, kFastestTurn_rad_s / std::max(rate.norm(), 1e-300));
+  place(turn, rate);
   for (Actuator& axis : axes_) axis.follow(0.0, 0.0, now_);
   history_.clear();
 }

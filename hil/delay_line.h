@@ -1,6 +1,5 @@
 #pragma once
 
-#include <utility>
 #include <vector>
 
 #include "engine/core/time.h"
@@ -12,6 +11,11 @@ namespace hil {
 template <class Value>
 class DelayLine {
  public:
+  struct Entry {
+    engine::SimTime due{};
+    Value value{};
+  };
+
   explicit DelayLine(std::size_t most) : entries_(most) {}
 
   /// False: full, and the value is lost. Pre: `due` never decreases.
@@ -21,18 +25,18 @@ class DelayLine {
     return true;
   }
   [[nodiscard]] bool has_due(engine::SimTime t) const noexcept {
-    return used_ > 0 && entries_[first_].first <= t;
+    return used_ > 0 && entries_[first_].due <= t;
   }
-  /// When, and what. Pre: something is under way.
-  std::pair<engine::SimTime, Value> pop() noexcept {
-    const auto entry = entries_[first_];
+  /// Pre: something is under way.
+  Entry pop() noexcept {
+    const Entry entry = entries_[first_];
     first_ = (first_ + 1) % entries_.size();
     --used_;
     return entry;
   }
 
  private:
-  std::vector<std::pair<engine::SimTime, Value>> entries_;
+  std::vector<Entry> entries_;
   std::size_t first_ = 0;
   std::size_t used_ = 0;
 };

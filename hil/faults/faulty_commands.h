@@ -51,7 +51,7 @@ class FaultyCommands final : public CommandSource {
  private:
   // More than can ever be due at once: all that is held, one command and its copy, and stand-ins
   // for it and for one look at the news.
-  static constexpr std::size_t kMostReady = 4 * kMostCommandsDelayed;
+  static constexpr std::size_t kMostReady = std::size_t{4} * kMostCommandsDelayed;
   struct Held {
     Command command;
     std::uint64_t due = 0;  ///< handed over just before this command
