@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "hil/frame_loop.h"
+#include "hil/loop_report.h"
 
 namespace hil {
 

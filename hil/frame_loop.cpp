@@ -44,8 +44,9 @@ FrameLoop::FrameLoop(const LoopSpec& spec, Clock& clock, PointingSource& pointin
 
 LoopReport FrameLoop::run(const std::stop_token& stop) {
   LoopReport report;
-  std::jthread sender([this](const std::stop_token& s) { send_frames(s); });
+  // In this order: where the system has no thread for the sender, the receiver ends by itself.
   std::jthread receiver([this](const std::stop_token& s) { receive_commands(s); });
+  std::jthread sender([this](const std::stop_token& s) { send_frames(s); });
   for (std::uint64_t k = 0; k < spec_.frames && !stop.stop_requested(); ++k) {
     k = skip_missed(k, report);
     if (k >= spec_.frames || !run_frame(k, stop, report)) break;

@@ -24,6 +24,12 @@ void WakeHistogram::add(Duration late) noexcept {
   worst_ = std::max(worst_, late);
 }
 
+void WakeHistogram::add(const WakeHistogram& other) noexcept {
+  for (std::size_t i = 0; i < kBins; ++i) bins_[i] += other.bins_[i];
+  count_ += other.count_;
+  worst_ = std::max(worst_, other.worst_);
+}
+
 Duration WakeHistogram::quantile(double share) const noexcept {
   const double wanted = share * static_cast<double>(count_);
   double under = 0;

@@ -21,6 +21,7 @@ struct Hiccup {
 class WakeHistogram {
  public:
   void add(engine::Duration late) noexcept;
+  void add(const WakeHistogram& other) noexcept;
   [[nodiscard]] std::uint64_t count() const noexcept { return count_; }
   [[nodiscard]] engine::Duration worst() const noexcept { return worst_; }
   /// The lateness that `share` of the wakes stay under, at its bin's upper edge.

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "hil/decisions.h"
+#include "hil/frame_loop.h"
 #include "hil/raw_log.h"
 
 namespace hil {

@@ -86,8 +86,9 @@ class Answers {
   /// The place of a verdict's frame among the records.
   [[nodiscard]] std::size_t place(std::size_t verdict) const { return places_[verdict]; }
   [[nodiscard]] std::span<const Claim> claims(std::size_t verdict) const {
-    const auto range = std::ranges::equal_range(claims_, verdict, {}, &Claim::frame);
-    return {range.begin(), range.end()};
+    // Two searches: clang 14 does not compile the subrange of libstdc++ 12 that one returns.
+    return {std::ranges::lower_bound(claims_, verdict, {}, &Claim::frame),
+            std::ranges::upper_bound(claims_, verdict, {}, &Claim::frame)};
   }
 
  private:

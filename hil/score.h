@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "engine/core/config_reader.h"
-#include "hil/frame_loop.h"
+#include "hil/loop_report.h"
 #include "hil/percentiles.h"
 
 namespace hil {

@@ -7,12 +7,18 @@ namespace engine {
 WorkerPool::WorkerPool(int threads) {
   ENSURE(threads >= 1);
   workers_.reserve(static_cast<std::size_t>(threads - 1));
-  for (int i = 1; i < threads; ++i) {
-    workers_.emplace_back([this](const std::stop_token& stop) { serve(stop); });
+  try {
+    for (int i = 1; i < threads; ++i)
+      workers_.emplace_back([this](const std::stop_token& stop) { serve(stop); });
+  } catch (...) {  // no thread left in the system: those that there are must not wait for work
+    dismiss();
+    throw;
   }
 }
 
-WorkerPool::~WorkerPool() {
+WorkerPool::~WorkerPool() { dismiss(); }
+
+void WorkerPool::dismiss() noexcept {
   for (auto& worker : workers_) worker.request_stop();
   round_.fetch_add(1, std::memory_order_release);
   round_.notify_all();

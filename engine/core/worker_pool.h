@@ -34,6 +34,7 @@ class WorkerPool {
   void run(int begin, int end, const void* work, Call call) noexcept;
   void take_rows() noexcept;
   void serve(const std::stop_token& stop) noexcept;
+  void dismiss() noexcept;
 
   // Written by the caller before `round_` is raised, read by the workers after.
   const void* work_ = nullptr;

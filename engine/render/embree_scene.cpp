@@ -74,21 +74,26 @@ RTCIntersectContext context_for(RTCIntersectContextFlags flags) noexcept {
   return context;
 }
 
+/// One for all scenes of the process, and never released: letting go of the last one would have the
+/// tracer start a thread of its own.
+RTCDevice tracing_device() {
+  // One building thread: the tree, and with it the bits, must not depend on the machine's load.
+  static RTCDevice device = rtcNewDevice("threads=1");
+  if (device == nullptr) throw std::runtime_error("Embree: no device");
+  return device;
+}
+
 }  // namespace
 
 struct EmbreeScene::Handles {
-  RTCDevice device = nullptr;
   RTCScene scene = nullptr;
   ~Handles() {
     if (scene != nullptr) rtcReleaseScene(scene);
-    if (device != nullptr) rtcReleaseDevice(device);
   }
 };
 
 EmbreeScene::EmbreeScene(const Mesh& mesh) : handles_(std::make_unique<Handles>()) {
-  // One building thread: the tree, and with it the bits, must not depend on the machine's load.
-  RTCDevice device = handles_->device = rtcNewDevice("threads=1");
-  if (device == nullptr) throw std::runtime_error("Embree: no device");
+  RTCDevice device = tracing_device();
   RTCScene scene = handles_->scene = rtcNewScene(device);
   rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
   rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_HIGH);

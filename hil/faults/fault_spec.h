@@ -32,11 +32,12 @@ namespace hil {
 ///       down. hot_column: `dn` more in `columns` (1) columns from `column` on; without `column`
 ///       they are drawn once, anywhere. stuck_column: `dn` (0) whatever the light. torn: from a
 ///       random row down those of the frame before. flipped: each bit is wrong at `bit_error_rate`.
-///   in the header    clock: shutter times are off by `jump_ms` (0) and, from `from_s` on, `ppm`
-///   (0). commands    command_lost. command_corrupted: `bits` (1) bits of the packet wrong, so that
-///   its
+///   in the header    clock: shutter times are off by `jump_ms` (0) and by `ppm` (0).
+///   commands    command_lost. command_corrupted: `bits` (1) bits of the packet wrong, so that its
 ///       checksum refuses it. command_delayed: handed over just before the one that comes
-///       `commands` (1) later. command_duplicated: handed over twice.
+///       `commands` (1) later; the loop's gate refuses one that a later one has overtaken, so it
+///       counts as reordered unless all are delayed alike. command_duplicated: handed over twice,
+///       and the second refused.
 enum class FaultKind : std::uint8_t {
   kAway,
   kDropped,

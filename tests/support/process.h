@@ -39,7 +39,7 @@ class Process {
   }
   ~Process() {
     if (pid_ > 0) static_cast<void>(kill());
-    close(out_);
+    close_pipe();
   }
   Process(const Process&) = delete;
   Process& operator=(const Process&) = delete;
@@ -63,8 +63,14 @@ class Process {
     return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
   }
   int kill() {
-    ::kill(pid_, SIGKILL);
+    send(SIGKILL);
     return wait();
+  }
+  void send(int signal) { ::kill(pid_, signal); }
+  /// From here on nobody listens.
+  void close_pipe() {
+    if (out_ >= 0) close(out_);
+    out_ = -1;
   }
 
  private:

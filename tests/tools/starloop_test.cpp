@@ -144,10 +144,10 @@ TEST(StarloopRun, AMissedCriterionOfDetectionIsSaidAndEndsWithOne) {
       folder.path(), {"--set", "run.duration_s=0.5", "--set", "criteria.pointing_rms_px=0", "--set",
                       "criteria.max_latency_frames=0", "--set", "criteria.min_detection_rate=0.9"});
   EXPECT_EQ(run.exit_code, kCriterionFailed);
-  EXPECT_NE(run.out.find("the largest latency in frames is 1, and must be at most 0"),
+  EXPECT_NE(run.err.find("the largest latency in frames is 1, and must be at most 0"),
             std::string::npos)
-      << run.out << run.err;
-  EXPECT_EQ(run.out.find("the detection rate"), std::string::npos) << run.out;
+      << run.err << run.err;
+  EXPECT_EQ(run.err.find("the detection rate"), std::string::npos) << run.out;
   const nlohmann::json report = report_of(folder.path());
   EXPECT_EQ(report.at("criteria_met"), false);
   EXPECT_EQ(report.at("detection").at("detected"), 6);

@@ -41,7 +41,7 @@ hil::FrameSink& Connections::link_with_row() noexcept {
   return link_.frames();
 }
 
-void Connections::start(hil::Clock& clock, bool open_loop) {
+void Connections::start(hil::Clock& clock, const DeviceManner& manner) {
   const bool realtime = scenario_.run.clock == ClockMode::kRealtime;
   faulty_frames_.emplace(scenario_.faults, hil::FaultySink::Shape{loop_.width_px, loop_.height_px},
                          loop_.start, link_with_row(), realtime ? &clock : nullptr);
@@ -53,8 +53,8 @@ void Connections::start(hil::Clock& clock, bool open_loop) {
       lockstep ? hil::FaultyCommands::Pace::kLockstep : hil::FaultyCommands::Pace::kRealtime);
   if (port_) frames_and_port_.emplace(*faulty_frames_, *port_);
   if (link_.mock() != nullptr)
-    tracker_ = std::jthread(
-        [this, open_loop](const std::stop_token& stop) { run_tracker(stop, open_loop); });
+    tracker_ =
+        std::jthread([this, manner](const std::stop_token& stop) { run_tracker(stop, manner); });
 }
 
 void Connections::stop() {
@@ -68,15 +68,22 @@ hil::FrameSink& Connections::frames() noexcept {
 }
 
 /// The software under test: on a thread of its own, it sees bytes and answers with bytes.
-void Connections::run_tracker(const std::stop_token& stop, bool open_loop) {
+void Connections::run_tracker(const std::stop_token& stop, const DeviceManner& manner) {
   tracker::TrackerSpec spec = scenario_.tracker;
-  spec.reports_only = open_loop;
+  spec.reports_only = manner.reports_only;
   tracker::Tracker tracker(spec, loop_.width_px, loop_.height_px);
   drivers::MockLink& device = *link_.mock();
-  while (!stop.stop_requested()) {
+  // What is still on the cable when the loop has ended is read as well.
+  for (;;) {
     const auto bytes = device.next_frame(kPatience);
-    if (!bytes.ok()) continue;
+    if (!bytes.ok()) {
+      if (stop.stop_requested()) return;
+      continue;
+    }
     const auto answer = tracker.on_frame(bytes.value());
+    if (manner.hold > Duration{} && !stop.stop_requested())
+      std::this_thread::sleep_for(manner.hold);
+    if (manner.audit != nullptr) manner.audit->see(bytes.value());
     device.release_frame();
     if (answer) static_cast<void>(device.reply(answer->bytes()));
   }

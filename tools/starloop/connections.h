@@ -12,9 +12,18 @@
 #include "hil/faults/faulty_sink.h"
 #include "hil/merged_commands.h"
 #include "hil/row_writer.h"
+#include "tools/starloop/frame_audit.h"
 #include "tools/starloop/pacing.h"
 
 namespace starloop {
+
+/// How the built-in tracker goes about its work.
+struct DeviceManner {
+  bool reports_only = false;  ///< an open loop
+  engine::Duration hold{};    ///< it keeps each frame for so long: a slow reader
+  FrameAudit* audit =
+      nullptr;  ///< if given, sees each frame's bytes just before they are given back
+};
 
 /// What the loop is connected to: the link, the port for commands, the software under test when it
 /// is the built-in tracker, and the faults on the way.
@@ -35,7 +44,7 @@ class Connections {
   /// Whether somebody reads the frames.
   [[nodiscard]] const hil::FrameSink& link() const noexcept { return link_.frames(); }
   /// Sets up the faults, which need the clock of the run, and starts the built-in tracker.
-  void start(hil::Clock& clock, bool open_loop);
+  void start(hil::Clock& clock, const DeviceManner& manner);
   /// Ends the built-in tracker.
   void stop();
 
@@ -50,7 +59,7 @@ class Connections {
 
  private:
   [[nodiscard]] hil::FrameSink& link_with_row() noexcept;
-  void run_tracker(const std::stop_token& stop, bool open_loop);
+  void run_tracker(const std::stop_token& stop, const DeviceManner& manner);
 
   const Scenario& scenario_;
   hil::LoopSpec loop_;

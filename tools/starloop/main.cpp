@@ -1,11 +1,35 @@
+#include <csignal>
 #include <cstdio>
 #include <exception>
+#include <memory>
+#include <mutex>
 
+#include <spdlog/sinks/base_sink.h>
+#include <spdlog/spdlog.h>
 #include <CLI/CLI.hpp>
 
 #include "tools/starloop/subcommands.h"
 
 namespace {
+
+/// Results to stdout, complaints to stderr.
+class TwoStreams final : public spdlog::sinks::base_sink<std::mutex> {
+  void sink_it_(const spdlog::details::log_msg& message) override {
+    spdlog::memory_buf_t text;
+    formatter_->format(message, text);
+    std::FILE* stream = message.level >= spdlog::level::warn ? stderr : stdout;
+    std::fwrite(text.data(), 1, text.size(), stream);
+  }
+  void flush_() override { std::fflush(stdout); }
+};
+
+void set_up_messages(bool quiet) {
+  auto logger = std::make_shared<spdlog::logger>("", std::make_shared<TwoStreams>());
+  logger->set_pattern("%v");
+  logger->set_level(quiet ? spdlog::level::warn : spdlog::level::info);
+  logger->flush_on(spdlog::level::info);
+  spdlog::set_default_logger(logger);
+}
 
 void add_common(CLI::App& command, starloop::CommonOptions& options) {
   command.add_option("scenario", options.file, "scenario file, TOML (see config/flyby.toml)")
@@ -42,6 +66,8 @@ int run_command(int argc, char** argv) {
   run_app->add_option("--out", run.out, "folder that gets <scenario>/<UTC time>/; default: out");
   run_app->add_option("--compare", run.compare,
                       "folder of another run, whose pointing error is plotted along");
+  run_app->add_flag("--no-pictures", run.no_pictures,
+                    "no contact sheet, no plots and no report.html: they take seconds");
 
   bool json = false;
   CLI::App* passes_app = app.add_subcommand("passes", "List when the camera can see the target");
@@ -55,6 +81,16 @@ int run_command(int argc, char** argv) {
       ->required()
       ->check(CLI::Range(0.0, 9e9));
   render_app->add_option("--out", render.out, "FITS file; the PNG goes beside it")
+      ->capture_default_str();
+
+  starloop::SoakOptions soak;
+  CLI::App* soak_app = app.add_subcommand(
+      "soak", "Fly a pass over and over; exit 1 when anything slips, grows or gets lost");
+  add_common(*soak_app, common);
+  soak_app->add_option("--minutes", soak.minutes, "how long; the round in hand is flown to its end")
+      ->check(CLI::Range(0.0, 1e6))
+      ->capture_default_str();
+  soak_app->add_option("--out", soak.out, "folder that gets <scenario>-soak/<UTC time>/")
       ->capture_default_str();
 
   starloop::ReplayOptions replay;
@@ -73,7 +109,9 @@ int run_command(int argc, char** argv) {
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? starloop::kGood : starloop::kBadInput;
   }
+  set_up_messages(common.quiet || replay.quiet);
   if (run_app->parsed()) return starloop::run_pass(common, run);
+  if (soak_app->parsed()) return starloop::soak(common, soak);
   if (replay_app->parsed()) return starloop::replay_log(replay);
   if (passes_app->parsed()) return starloop::list_passes(common, json);
   return starloop::render_frame(common, render);
@@ -82,6 +120,8 @@ int run_command(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  // A reader of our lines who has left, and a disk quota: errors of the write, and no more.
+  for (const int s : {SIGPIPE, SIGXFSZ}) std::signal(s, SIG_IGN);
   try {
     return run_command(argc, argv);
   } catch (const engine::ConfigError& e) {

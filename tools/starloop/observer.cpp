@@ -17,13 +17,16 @@ constexpr Duration kPatience{20'000'000};
 constexpr Duration kLate{1'000'000};
 
 volatile std::sig_atomic_t signalled = 0;
-void on_signal(int /*signal*/) { signalled = 1; }
+void on_signal(int signal) {
+  // Who asks twice does not want to wait for the frame in hand.
+  if (signalled != 0) std::signal(signal, SIG_DFL);
+  signalled = 1;
+}
 
 }  // namespace
 
 void catch_signals() {
-  std::signal(SIGINT, on_signal);
-  std::signal(SIGTERM, on_signal);
+  for (const int s : {SIGINT, SIGTERM, SIGHUP}) std::signal(s, on_signal);
 }
 
 bool interrupted() noexcept { return signalled != 0; }

@@ -21,7 +21,7 @@ class Observer {
   };
   Observer(const Scenario& scenario, const Peers& peers, std::uint64_t frames, bool quiet);
 
-  /// Until `stop`; asks the loop to stop when the user does, by SIGINT or SIGTERM.
+  /// Until `stop`; asks the loop to stop when the user does (catch_signals()).
   void watch(const std::stop_token& stop, std::stop_source& loop_stop);
   [[nodiscard]] RunLog& log() noexcept { return log_; }
 
@@ -40,7 +40,8 @@ class Observer {
   RunLog log_;
 };
 
-/// From here on SIGINT and SIGTERM end a run in order instead of at once.
+/// From here on SIGINT, SIGTERM and SIGHUP end a run in order instead of at once, unless one comes
+/// twice.
 void catch_signals();
 [[nodiscard]] bool interrupted() noexcept;
 

@@ -185,7 +185,6 @@ int verdict(const hil::Recording& log, const Comparison& seen, const fs::path& f
 }  // namespace
 
 int replay_log(const ReplayOptions& options) {
-  spdlog::set_pattern("%v");
   std::error_code error;
   const bool is_folder = fs::is_directory(options.log, error);
   const fs::path path = is_folder ? fs::path(options.log) / "record.slog" : fs::path(options.log);

@@ -238,4 +238,14 @@ std::vector<engine::Pass> passes_of(const Scenario& scenario) {
                              engine::SimTime{scenario.search_span});
 }
 
+engine::Pass chosen_pass(const Scenario& scenario) {
+  const std::vector<engine::Pass> passes = passes_of(scenario);
+  if (scenario.run.pass > passes.size()) {
+    throw engine::ConfigError(
+        scenario.run.pass_where + " must be one of the " + std::to_string(passes.size()) +
+        " passes that these orbits have, got " + std::to_string(scenario.run.pass));
+  }
+  return passes[scenario.run.pass - 1];
+}
+
 }  // namespace starloop

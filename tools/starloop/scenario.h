@@ -141,5 +141,7 @@ class Rig {
                                                     engine::SimTime start);
 
 [[nodiscard]] std::vector<engine::Pass> passes_of(const Scenario& scenario);
+/// The one that the scenario's run is about. Throws engine::ConfigError when there is no such.
+[[nodiscard]] engine::Pass chosen_pass(const Scenario& scenario);
 
 }  // namespace starloop

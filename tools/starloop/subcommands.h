@@ -23,9 +23,18 @@ struct RunOptions {
   bool open_loop = false;
   std::string out = "out";
   std::string compare;  ///< the folder of another run, for the plot
+  bool no_pictures = false;
 };
 /// Runs a pass as a loop.
 int run_pass(const CommonOptions& options, const RunOptions& run);
+
+struct SoakOptions {
+  double minutes = 10;
+  std::string out = "out";
+};
+/// Flies the pass again and again, each time from set-up to closed logs, and looks for what slips,
+/// grows or gets lost.
+int soak(const CommonOptions& options, const SoakOptions& spec);
 
 struct ReplayOptions {
   std::string log;  ///< record.slog, or the folder it is in

@@ -20,7 +20,10 @@ cv::Mat as_image(const drivers::FrameView& view) {
 }  // namespace
 
 Tracker::Tracker(const TrackerSpec& spec, int width_px, int height_px)
-    : spec_(spec), width_px_(width_px), height_px_(height_px), histogram_(65536) {}
+    : spec_(spec), width_px_(width_px), height_px_(height_px), histogram_(65536) {
+  // A pool of OpenCV's own would take time from the loop's workers.
+  cv::setNumThreads(1);
+}
 
 std::optional<hil::CommandPacket> Tracker::on_frame(std::span<const std::byte> bytes) {
   const auto decoded = drivers::decode_frame(bytes);
