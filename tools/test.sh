@@ -17,6 +17,11 @@ build() {
 }
 # What halts on the first finding; leaks of libraries that never free their tables are not ours.
 export ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=print_stacktrace=1
+export TSAN_OPTIONS="suppressions=$PWD/tests/tsan_suppressions.txt"
+# Whatever has threads; the rest would only take longer.
+threaded='FrameLoop|Lockstep|LoopGate|TriggeredLoop|LateFrames|LoopLatency|SpscRing|WorkerPool'
+threaded+='|MockLink|Shm|Usb|CommandPort|MergedCommands|Recorder|HiccupMeter|Faults|ImagingChain'
+threaded+='|Tracker|ForeignProcess|StarloopSoak'
 
 if [[ "$full" == yes ]]; then
   tools/setup.sh --full
@@ -24,7 +29,7 @@ if [[ "$full" == yes ]]; then
   build debug
   ctest --preset debug -j "$jobs" -LE long
   build tsan
-  ctest --preset tsan -j "$jobs" -R 'FrameLoop|SpscRing|WorkerPool|MockLink|Shm|ImagingChain|Tracker'
+  ctest --preset tsan -j "$jobs" -R "$threaded"
   build asan
   ctest --preset asan -j "$jobs"
 else
