@@ -2,10 +2,9 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
-#include <cstring>
 
+#include "drivers/little_endian.h"
 #include "engine/core/crc32c.h"
 
 namespace drivers {
@@ -17,24 +16,10 @@ using engine::Error;
 using engine::Fault;
 using engine::SimTime;
 
-static_assert(std::endian::native == std::endian::little, "the wire format is written as it lies");
-
 constexpr char kFrameMagic[4] = {'S', 'L', 'F', '2'};
 constexpr std::size_t kPayloadBytesAt = 144;
 constexpr std::size_t kPayloadCrcAt = 148;
 constexpr std::size_t kHeaderCrcAt = 188;
-
-template <class T>
-void put(std::span<std::byte> out, std::size_t at, const T& value) noexcept {
-  std::memcpy(out.data() + at, &value, sizeof value);
-}
-
-template <class T>
-[[nodiscard]] T get(std::span<const std::byte> in, std::size_t at) noexcept {
-  T value{};
-  std::memcpy(&value, in.data() + at, sizeof value);
-  return value;
-}
 
 Error rejected(const char* step) noexcept { return {Fault::kRejected, 0, step}; }
 

@@ -1,9 +1,5 @@
 #include "drivers/mock_link.h"
 
-#include <algorithm>
-
-#include "hil/space_packet.h"
-
 namespace drivers {
 
 using engine::Done;
@@ -31,13 +27,6 @@ Status MockLink::send(const hil::Frame& frame, Duration timeout) noexcept {
   return Done{};
 }
 
-Expected<hil::Command> MockLink::receive(Duration timeout) noexcept {
-  if (!packet_count_.try_acquire_for(timeout)) return Error{Fault::kTimeout, 0, "mock: receive"};
-  Packet packet;
-  if (!packets_.pop(packet)) return Error{Fault::kTimeout, 0, "mock: receive"};
-  return hil::decode_command(std::span(packet.bytes).first(packet.used));
-}
-
 Expected<std::span<const std::byte>> MockLink::next_frame(Duration timeout) noexcept {
   if (!full_.try_acquire_for(timeout)) return Error{Fault::kTimeout, 0, "mock: next frame"};
   const Slot& slot = slots_[next_to_read_];
@@ -47,16 +36,6 @@ Expected<std::span<const std::byte>> MockLink::next_frame(Duration timeout) noex
 void MockLink::release_frame() noexcept {
   next_to_read_ = (next_to_read_ + 1) % kSlots;
   empty_.release();
-}
-
-Status MockLink::reply(std::span<const std::byte> bytes) noexcept {
-  if (bytes.size() > kLargestPacket) return Error{Fault::kRejected, 0, "mock: reply too long"};
-  Packet packet;
-  std::copy(bytes.begin(), bytes.end(), packet.bytes.begin());
-  packet.used = bytes.size();
-  if (!packets_.push(packet)) return Error{Fault::kBusy, 0, "mock: reply"};
-  packet_count_.release();
-  return Done{};
 }
 
 }  // namespace drivers

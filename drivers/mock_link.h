@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "drivers/frame_packet.h"
+#include "drivers/packet_queue.h"
 #include "hil/camera_link.h"
-#include "hil/spsc_ring.h"
 
 namespace drivers {
 
@@ -22,24 +22,21 @@ class MockLink final : public hil::FrameSink, public hil::CommandSource {
   MockLink(int width_px, int height_px);
 
   engine::Status send(const hil::Frame& frame, engine::Duration timeout) noexcept override;
-  engine::Expected<hil::Command> receive(engine::Duration timeout) noexcept override;
+  engine::Expected<hil::Command> receive(engine::Duration timeout) noexcept override {
+    return packets_.receive(timeout);
+  }
 
   /// The device's side. The bytes are the device's until it calls release_frame().
   [[nodiscard]] engine::Expected<std::span<const std::byte>> next_frame(
       engine::Duration timeout) noexcept;
   void release_frame() noexcept;
   /// kBusy when the camera has not taken the last 64 packets; kRejected for more than 256 bytes.
-  engine::Status reply(std::span<const std::byte> bytes) noexcept;
+  engine::Status reply(std::span<const std::byte> bytes) noexcept { return packets_.push(bytes); }
 
  private:
   static constexpr std::size_t kSlots = 3;
-  static constexpr std::size_t kLargestPacket = 256;
   struct Slot {
     std::vector<std::byte> bytes;
-    std::size_t used = 0;
-  };
-  struct Packet {
-    std::array<std::byte, kLargestPacket> bytes{};
     std::size_t used = 0;
   };
 
@@ -48,8 +45,7 @@ class MockLink final : public hil::FrameSink, public hil::CommandSource {
   std::size_t next_to_read_ = 0;  // the device's own
   std::counting_semaphore<> empty_{kSlots};
   std::counting_semaphore<> full_{0};
-  hil::SpscRing<Packet, 64> packets_;  // device -> receiver
-  std::counting_semaphore<> packet_count_{0};
+  PacketQueue packets_;  // device -> receiver
 };
 
 }  // namespace drivers

@@ -9,6 +9,7 @@ FrameWriter::FrameWriter(FrameStore& store, int width_px, int height_px, WhenBus
     : store_(store), when_busy_(when_busy) {
   for (std::size_t i = 0; i < kSlots; ++i) {
     slots_[i].pixels.resize(width_px, height_px);
+    slots_[i].row.resize(static_cast<std::size_t>(width_px));
     ENSURE(free_.push(i));
   }
   free_count_.release(kSlots);
@@ -43,7 +44,10 @@ engine::Status FrameWriter::take(const Frame& frame, engine::Duration timeout) n
   std::copy(pixels.begin(), pixels.end(), slot.pixels.pixels().begin());
   slot.frame = frame;
   slot.frame.pixels = &slot.pixels;
-  slot.frame.telemetry_row = {};
+  const std::span<const std::uint16_t> row = frame.telemetry_row;
+  ENSURE(row.size() <= slot.row.size());
+  std::copy(row.begin(), row.end(), slot.row.begin());
+  slot.frame.telemetry_row = std::span(slot.row).first(row.size());
   slot.frame.truth_mask = nullptr;
   ENSURE(ready_.push(i));
   ready_count_.release();

@@ -5,6 +5,7 @@
 #include <semaphore>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "hil/frame_loop.h"
 #include "hil/frame_store.h"
@@ -40,6 +41,7 @@ class FrameWriter {
   struct Slot {
     Frame frame;
     engine::DnImage pixels;
+    std::vector<std::uint16_t> row;
   };
   void write_frames() noexcept;
   void remember(const char* words) noexcept;

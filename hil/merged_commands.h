@@ -1,22 +1,24 @@
 #pragma once
 
-#include <array>
 #include <atomic>
+#include <memory>
 #include <semaphore>
 #include <thread>
+#include <vector>
 
 #include "hil/camera_link.h"
 #include "hil/spsc_ring.h"
 
 namespace hil {
 
-/// Two sources as one: commands in the order of their arrival, each source's own senders told
+/// Several sources as one: commands in the order of their arrival, each source's own senders told
 /// apart. A thread waits on each.
 /// Thread: receiver. Loop-safe once made.
 class MergedCommands final : public CommandSource {
  public:
-  /// Both outlive it.
-  MergedCommands(CommandSource& first, CommandSource& second);
+  static constexpr std::size_t kMost = 8;
+  /// All outlive it. Pre: 1 to kMost.
+  explicit MergedCommands(const std::vector<CommandSource*>& sources);
   MergedCommands(const MergedCommands&) = delete;
   MergedCommands& operator=(const MergedCommands&) = delete;
 
@@ -28,14 +30,14 @@ class MergedCommands final : public CommandSource {
     engine::Error fault;
     Command command;
   };
-  using Ring = SpscRing<Item, 256>;
+  struct Ring : SpscRing<Item, 256> {};
   void pump(CommandSource& source, std::uint32_t which, const std::stop_token& stop) noexcept;
 
-  std::array<Ring, 2> rings_;  // each pump -> receiver
+  std::vector<std::unique_ptr<Ring>> rings_;  // each pump -> receiver
   std::counting_semaphore<> count_{0};
   std::atomic<std::uint64_t> lost_{0};
   std::size_t next_ = 0;
-  std::array<std::jthread, 2> pumps_;  // the last member: they use the others
+  std::vector<std::jthread> pumps_;  // the last member: they use the others
 };
 
 }  // namespace hil

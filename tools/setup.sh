@@ -8,9 +8,9 @@ packages=(
   # libraries that the program links
   libembree-dev libopencv-dev libeigen3-dev libtomlplusplus-dev libcli11-dev libspdlog-dev
   liberfa-dev libcfitsio-dev librandom123-dev libtinyobjloader-dev nlohmann-json3-dev
-  libasio-dev libssl-dev
+  libasio-dev libssl-dev libusb-1.0-0-dev
   # tests, benchmarks, pictures
-  libgtest-dev libbenchmark-dev python3 python3-matplotlib python3-numpy
+  libgtest-dev libumockdev-dev umockdev libbenchmark-dev python3 python3-matplotlib python3-numpy
 )
 # The slow checks of tools/test.sh --full only.
 if [[ "${1:-}" == "--full" ]]; then packages+=(clang-format clang-tidy); fi

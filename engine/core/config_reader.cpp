@@ -212,6 +212,18 @@ std::string ConfigTable::text_or(const std::string& key, const std::string& fall
   return has(key) ? text(key) : fallback;
 }
 
+std::vector<std::string> ConfigTable::texts(const std::string& key) const {
+  if (!has(key)) return {};
+  const toml::array* list = document_->find(path(key))->as_array();
+  if (list == nullptr) return {text(key)};
+  std::vector<std::string> all;
+  for (const toml::node& node : *list) {
+    if (!node.is_string()) fail(key, "must be a list of texts, got in it " + kind_text(node));
+    all.push_back(node.as_string()->get());
+  }
+  return all;
+}
+
 bool ConfigTable::flag_or(const std::string& key, bool fallback) const {
   if (!has(key)) return fallback;
   const toml::node* node = document_->find(path(key));

@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "hil/no_commands.h"
 #include "tests/support/fakes.h"
 
 namespace {
@@ -91,7 +92,7 @@ TEST(FrameLoop, OpensEveryShutterOnTheGridAndSendsEveryFrameInOrder) {
   std::vector<SimTime> opened_at;
   fakes::PixelGenerator generator([&](const engine::Shot&) { opened_at.push_back(clock.now()); });
   fakes::Sink sink;
-  fakes::SilentSource source;
+  hil::NoCommands source;
   FrameLoop loop(patient_loop(40), clock, pointing, generator, sink, source);
   const LoopReport report = loop.run({});
   EXPECT_EQ(report.due, 40U);
@@ -151,7 +152,7 @@ Stalled run_stalled(std::uint64_t frames, std::uint64_t at, Duration stall) {
     if (shot.sequence == at) clock.pass(stall);
   });
   fakes::Sink sink;
-  fakes::SilentSource source;
+  hil::NoCommands source;
   FrameLoop loop(patient_loop(frames), clock, pointing, generator, sink, source);
   out.report = loop.run({});
   out.records = drain(loop.frames());
@@ -227,7 +228,7 @@ TEST(FrameLoop, ALoopThatStartsLateSkipsWhatIsOverAndCountsIt) {
   IdealPointing pointing;
   fakes::PixelGenerator generator;
   fakes::Sink sink;
-  fakes::SilentSource source;
+  hil::NoCommands source;
   FrameLoop loop(patient_loop(10), clock, pointing, generator, sink, source);
   const LoopReport report = loop.run({});
   EXPECT_EQ(report.skipped, 3U);
@@ -243,7 +244,7 @@ TEST(FrameLoop, CountsFramesThatWereWokenOverAMillisecondLate) {
     IdealPointing pointing;
     fakes::PixelGenerator generator;
     fakes::Sink sink;
-    fakes::SilentSource source;
+    hil::NoCommands source;
     FrameLoop loop(patient_loop(10), clock, pointing, generator, sink, source);
     const LoopReport report = loop.run({});
     EXPECT_EQ(report.sent, 10U);
@@ -265,7 +266,7 @@ TEST(FrameLoop, ASecondOfStallsAtRandomStillAddsUp) {
     if (frame.sequence % 3 == 0) return Error{Fault::kDisconnected, 0, "test"};
     return engine::Done{};
   });
-  fakes::SilentSource source;
+  hil::NoCommands source;
   FrameLoop loop(patient_loop(200), clock, pointing, generator, sink, source);
   const LoopReport report = loop.run({});
   EXPECT_EQ(report.due, 200U);
@@ -291,7 +292,7 @@ TEST(FrameLoop, ASinkThatRefusesCountsFaultsAndRemembersTheLast) {
       return Error{Fault::kRejected, static_cast<int>(frame.sequence), "test"};
     return engine::Done{};
   });
-  fakes::SilentSource source;
+  hil::NoCommands source;
   FrameLoop loop(patient_loop(20), clock, pointing, generator, sink, source);
   const LoopReport report = loop.run({});
   EXPECT_EQ(report.faults, 5U);
@@ -313,7 +314,7 @@ TEST(FrameLoop, ASinkThatHoldsEverySlotCostsFramesButNeverDelaysTheLoop) {
     gate.acquire();
     return engine::Done{};
   });
-  fakes::SilentSource source;
+  hil::NoCommands source;
   FrameLoop loop(small_loop(kFrames), clock, pointing, generator, sink, source);
   LoopReport report;
   std::jthread runner([&] { report = loop.run({}); });
@@ -354,7 +355,7 @@ TEST(FrameLoop, ARehearsalWaitsForItsSinkAndKeepsEveryFrame) {
     EXPECT_EQ(frame.shutter_open, opening(frame.sequence));
     return engine::Done{};
   });
-  fakes::SilentSource source;
+  hil::NoCommands source;
   FrameLoop loop(patient_loop(kFrames), clock, pointing, generator, sink, source);
   LoopReport report;
   std::jthread runner([&] { report = loop.run({}); });
@@ -390,7 +391,7 @@ TEST(FrameLoop, NobodyWritesIntoAFrameWhileTheSinkHasIt) {
     }
     return engine::Done{};
   });
-  fakes::SilentSource source;
+  hil::NoCommands source;
   FrameLoop loop(patient_loop(200), clock, pointing, generator, sink, source);
   EXPECT_EQ(loop.run({}).sent, 200U);
   EXPECT_EQ(wrong, 0);
@@ -401,7 +402,7 @@ TEST(FrameLoop, AnObserverThatNeverLooksCostsRecordsAndNoFrames) {
   IdealPointing pointing;
   fakes::PixelGenerator generator;
   fakes::Sink sink;
-  fakes::SilentSource source;
+  hil::NoCommands source;
   FrameLoop loop(patient_loop(300), clock, pointing, generator, sink, source);
   const LoopReport report = loop.run({});
   EXPECT_EQ(report.sent, 300U);
@@ -616,7 +617,7 @@ TEST(FrameLoop, LockstepEndsWhenTheLinkIsGone) {
   fakes::Sink sink([](const Frame&, Duration) -> Status {
     return Error{Fault::kDisconnected, 19, "gone"};
   });
-  fakes::SilentSource source;
+  hil::NoCommands source;
   LoopSpec spec = lockstep_loop(100);
   spec.answer_timeout = kMillisecond;
   FrameLoop loop(spec, clock, pointing, generator, sink, source);
@@ -630,7 +631,7 @@ TEST(FrameLoop, LockstepAnswersThatNeverFitDoNotKeepItWaitingForEver) {
   hil::ManualClock clock(kStart - kPeriod);
   IdealPointing pointing;
   fakes::PixelGenerator generator;
-  fakes::SilentSource nobody;
+  hil::NoCommands nobody;
   // A device that talks all the time, but of another frame: one command after the other, as fast
   // as the loop takes them, and each sooner than the timeout.
   class Chatter final : public hil::CommandSource {
@@ -667,7 +668,7 @@ TEST(FrameLoop, AStopEndsItAfterTheFrameInHand) {
     if (shot.sequence == 5) stop.request_stop();
   });
   fakes::Sink sink;
-  fakes::SilentSource source;
+  hil::NoCommands source;
   FrameLoop loop(patient_loop(1'000'000), clock, pointing, generator, sink, source);
   const LoopReport report = loop.run(stop.get_token());
   EXPECT_EQ(report.due, 6U);
@@ -682,7 +683,7 @@ TEST(FrameLoop, AStopBeforeTheFirstFrameSendsNone) {
   IdealPointing pointing;
   fakes::PixelGenerator generator;
   fakes::Sink sink;
-  fakes::SilentSource source;
+  hil::NoCommands source;
   FrameLoop loop(patient_loop(10), clock, pointing, generator, sink, source);
   const LoopReport report = loop.run(stop.get_token());
   EXPECT_EQ(report.due, 0U);
@@ -701,7 +702,7 @@ TEST(FrameLoop, AStopReachesALoopThatWaitsForASlot) {
     }
     return Error{Fault::kBusy, 0, "held"};
   });
-  fakes::SilentSource source;
+  hil::NoCommands source;
   FrameLoop loop(patient_loop(1'000'000), clock, pointing, generator, sink, source);
   LoopReport report;
   std::jthread runner([&] { report = loop.run(stop.get_token()); });
@@ -761,7 +762,7 @@ TEST(FrameLoopDeathTest, RefusesAnExposureThatDoesNotFitIntoAPeriod) {
   IdealPointing pointing;
   fakes::PixelGenerator generator;
   fakes::Sink sink;
-  fakes::SilentSource source;
+  hil::NoCommands source;
   EXPECT_DEATH(FrameLoop(spec, clock, pointing, generator, sink, source), "our own mistake");
 }
 

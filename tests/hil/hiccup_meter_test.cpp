@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "hil/frame_loop.h"
+#include "hil/no_commands.h"
 #include "tests/support/fakes.h"
 
 namespace {
@@ -91,7 +92,7 @@ int run_loop_that_is_stopped(int tell) {
     if (shot.sequence == 10 && write(tell, &byte, 1) != 1) std::_Exit(10);
   });
   fakes::Sink sink;
-  fakes::SilentSource source;
+  hil::NoCommands source;
   hil::LoopSpec spec;
   spec.start = engine::sim_time(1.0);
   spec.period = kPeriod;

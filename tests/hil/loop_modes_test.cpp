@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "hil/frame_loop.h"
+#include "hil/no_commands.h"
 #include "tests/support/fakes.h"
 
 namespace {
@@ -42,7 +43,7 @@ struct Rig {
   hil::ManualClock clock{kStart - kPeriod};
   fakes::IdealPointing pointing;
   fakes::Sink sink;
-  fakes::SilentSource silent;
+  hil::NoCommands silent;
 };
 
 TEST(TriggeredLoop, MakesOneFrameForEachPullAndEndsWhenNobodyPullsAnyMore) {
@@ -166,7 +167,7 @@ class HandNumbered final : public hil::CommandSource {
   std::vector<Command> commands_;
   std::size_t next_ = 0;
   std::atomic<bool> done_{false};
-  fakes::SilentSource never_;
+  hil::NoCommands never_;
 };
 
 Command trim_to(double offset_rad, std::uint64_t sequence) {

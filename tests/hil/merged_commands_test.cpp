@@ -19,7 +19,7 @@ constexpr Duration kLong{20'000'000'000};  // only a source that is wrong waits 
 TEST(MergedCommands, BothSourcesAreHeardAndEachKeepsItsOrder) {
   fakes::QueueSource first;
   fakes::QueueSource second;
-  MergedCommands merged(first, second);
+  MergedCommands merged({&first, &second});
   for (int i = 0; i < 100; ++i) {
     first.give(Command{});
     second.give(Command{});
@@ -28,7 +28,7 @@ TEST(MergedCommands, BothSourcesAreHeardAndEachKeepsItsOrder) {
   for (int i = 0; i < 200; ++i) {
     const auto command = merged.receive(kLong);
     ASSERT_TRUE(command.ok()) << i;
-    const std::size_t which = command.value().sender >> 31;
+    const std::size_t which = command.value().sender >> 29;
     EXPECT_EQ(command.value().sequence, last[which] + 1);
     last[which] = command.value().sequence;
   }
@@ -41,7 +41,7 @@ TEST(MergedCommands, BothSourcesAreHeardAndEachKeepsItsOrder) {
 TEST(MergedCommands, SendersOfTheSameNumberAreToldApart) {
   fakes::QueueSource first;
   fakes::QueueSource second;
-  MergedCommands merged(first, second);
+  MergedCommands merged({&first, &second});
   Command command;
   command.sender = 1;
   first.give(command);
@@ -55,7 +55,7 @@ TEST(MergedCommands, SendersOfTheSameNumberAreToldApart) {
 TEST(MergedCommands, AFaultOfEitherComesThrough) {
   fakes::QueueSource first;
   fakes::QueueSource second;
-  MergedCommands merged(first, second);
+  MergedCommands merged({&first, &second});
   second.give(Error{Fault::kRejected, 7, "checksum"});
   const auto fault = merged.receive(kLong);
   ASSERT_FALSE(fault.ok());
@@ -66,7 +66,7 @@ TEST(MergedCommands, AFaultOfEitherComesThrough) {
 TEST(MergedCommands, AFloodOnOneSourceIsBoundedAndCountedAndDoesNotSilenceTheOther) {
   fakes::QueueSource first;
   fakes::QueueSource second;
-  MergedCommands merged(first, second);
+  MergedCommands merged({&first, &second});
   for (int i = 0; i < 1000; ++i) first.give(Command{});
   first.wait_until_taken();
   second.give(Command{});
@@ -78,7 +78,7 @@ TEST(MergedCommands, AFloodOnOneSourceIsBoundedAndCountedAndDoesNotSilenceTheOth
     const auto command = merged.receive(kLong);
     if (command.ok()) {
       ++heard;
-      other = other || command.value().sender >> 31 == 1;
+      other = other || command.value().sender >> 29 == 1;
     } else {
       EXPECT_EQ(command.error().fault, Fault::kBusy);
       ++lost;

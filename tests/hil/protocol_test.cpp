@@ -5,6 +5,7 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <starloop_test_paths.h>
 
 #include "hil/space_packet.h"
 #include "hil/telemetry_packet.h"

@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "hil/closed_loop_pointing.h"
+#include "hil/no_commands.h"
 #include "hil/recorder.h"
 #include "tests/support/fakes.h"
 #include "tests/support/temp_file.h"
@@ -113,7 +114,7 @@ Flown replay(const Recording& log) {
     if (frame.sequence % 5 == 0) std::this_thread::yield();
     return engine::Done{};
   });
-  fakes::SilentSource source;
+  hil::NoCommands source;
   auto loop = std::make_unique<FrameLoop>(spec, clock, pointing, generator, sink, source);
   Flown out;
   out.report = loop->run({});

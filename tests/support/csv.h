@@ -1,5 +1,6 @@
 #pragma once
 
+#include <starloop_test_paths.h>
 #include <cctype>
 #include <cstdlib>
 #include <fstream>
@@ -37,7 +38,7 @@ class Csv {
   };
 
   explicit Csv(const std::string& name) : name_(name) {
-    std::ifstream file(std::string(STARLOOP_TEST_DATA) + "/" + name);
+    std::ifstream file(std::string(STARLOOP_SOURCE_DIR "/tests/data/") + name);
     std::string line;
     if (!std::getline(file, line)) throw std::runtime_error(name + ": no such table");
     for (const std::string& header : split(line)) columns_.push_back(header);

@@ -112,18 +112,6 @@ class Sink final : public hil::FrameSink {
   std::vector<std::uint64_t> sequences_;
 };
 
-/// Nobody commands.
-class SilentSource final : public hil::CommandSource {
- public:
-  engine::Expected<hil::Command> receive(engine::Duration timeout) noexcept override {
-    static_cast<void>(never_.try_acquire_for(timeout));
-    return engine::Error{engine::Fault::kTimeout, 0, "silent"};
-  }
-
- private:
-  std::counting_semaphore<> never_{0};
-};
-
 /// Hands over what another thread gives it: commands, or faults.
 class QueueSource final : public hil::CommandSource {
  public:

@@ -6,6 +6,7 @@
 //   sync:N:E       the Nth fsync or fdatasync fails with errno E
 //   open:N:E       the Nth opening of a file for writing fails with errno E
 //   thread:N:E     the Nth thread is not made, with errno E
+//   clock          the time of day jumps an hour forward or back at every look at it
 //   eintr          a signal a millisecond, all along: every call that waits is interrupted
 // The C library's own streams do not come by here.
 
@@ -16,6 +17,7 @@
 #include <cstddef>
 #include <cstdlib>
 #include <cstring>
+#include <ctime>
 #include <new>
 
 #include <dlfcn.h>
@@ -28,7 +30,7 @@
 
 namespace {
 
-enum class What { kNothing, kNew, kWrite, kShort, kSync, kOpen, kThread, kEintr };
+enum class What { kNothing, kNew, kWrite, kShort, kSync, kOpen, kThread, kClock, kEintr };
 
 What what = What::kNothing;
 long nth = 0;
@@ -53,6 +55,11 @@ bool is_file(int descriptor) {
   return fstat(descriptor, &s) == 0 && S_ISREG(s.st_mode);
 }
 
+time_t jump_s() {
+  if (what != What::kClock) return 0;
+  return calls++ % 2 == 0 ? 3600 : -3600;
+}
+
 void read_orders() {
   const char* text = std::getenv("STARLOOP_FAULT");
   if (text == nullptr) return;
@@ -61,9 +68,9 @@ void read_orders() {
   const struct {
     const char* name;
     What what;
-  } names[] = {{"new:", What::kNew},   {"write:", What::kWrite}, {"short:", What::kShort},
-               {"sync:", What::kSync}, {"open:", What::kOpen},   {"thread:", What::kThread},
-               {"eintr", What::kEintr}};
+  } names[] = {{"new:", What::kNew},    {"write:", What::kWrite}, {"short:", What::kShort},
+               {"sync:", What::kSync},  {"open:", What::kOpen},   {"thread:", What::kThread},
+               {"clock", What::kClock}, {"eintr", What::kEintr}};
   for (const auto& n : names)
     if (std::strncmp(text, n.name, std::strlen(n.name)) == 0) what = n.what;
   if (what == What::kEintr) {
@@ -199,6 +206,24 @@ int open64(const char* path, int flags, ...) {
   const mode_t mode = va_arg(more, mode_t);
   va_end(more);
   return open_or_fail("open64", path, flags, mode);
+}
+
+int clock_gettime(clockid_t clock, timespec* t) {
+  const int result = next<int(clockid_t, timespec*)>("clock_gettime")(clock, t);
+  if (result == 0 && clock == CLOCK_REALTIME) t->tv_sec += jump_s();
+  return result;
+}
+time_t time(time_t* out) {
+  timespec t{};
+  clock_gettime(CLOCK_REALTIME, &t);
+  if (out != nullptr) *out = t.tv_sec;
+  return t.tv_sec;
+}
+int gettimeofday(timeval* out, void* /*zone*/) {
+  timespec t{};
+  const int result = clock_gettime(CLOCK_REALTIME, &t);
+  *out = {t.tv_sec, t.tv_nsec / 1000};
+  return result;
 }
 
 int pthread_create(pthread_t* thread, const pthread_attr_t* attributes, void* (*body)(void*),

@@ -4,6 +4,7 @@
 #include <string>
 
 #include <gtest/gtest.h>
+#include <starloop_test_paths.h>
 #include <nlohmann/json.hpp>
 
 #include "tests/tools/program.h"

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <starloop_test_paths.h>
 
 #include "drivers/shm_link.h"
 #include "tests/support/process.h"

@@ -4,6 +4,7 @@
 #include <string>
 
 #include <gtest/gtest.h>
+#include <starloop_test_paths.h>
 #include <nlohmann/json.hpp>
 
 #include "tests/support/process.h"
@@ -16,10 +17,9 @@ const std::string kFlyby = STARLOOP_SOURCE_DIR "/config/flyby.toml";
 program::Outcome run_over_shared_memory(const std::filesystem::path& out, const std::string& name,
                                         const std::vector<std::string>& more) {
   std::vector<std::string> arguments = {"run", kFlyby, "--quiet", "--out", out.string()};
-  for (const std::string& set :
-       {std::string("run.clock=lockstep"), std::string("run.duration_s=8"),
-        std::string("render.samples_per_pixel=9"), std::string("link.kind=shm"),
-        "link.name=" + name, std::string("link.telemetry_row=true")}) {
+  for (const std::string& set : {std::string("run.clock=lockstep"), std::string("run.duration_s=8"),
+                                 std::string("render.samples_per_pixel=9"), "link.to=shm:" + name,
+                                 std::string("link.telemetry_row=true")}) {
     arguments.emplace_back("--set");
     arguments.push_back(set);
   }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <starloop_test_paths.h>
 #include <opencv2/imgcodecs.hpp>
 
 #include "tests/tools/program.h"

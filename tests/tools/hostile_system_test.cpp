@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <starloop_test_paths.h>
 
 #include "hil/run_log.h"
 #include "tests/support/process.h"
@@ -157,11 +158,21 @@ TEST_F(HostileSystem, ASignalAMillisecondChangesNoBit) {
   EXPECT_EQ(checksums(run.log), checksums(calm().log));
 }
 
+TEST_F(HostileSystem, ATimeOfDayThatJumpsByHoursIsNotLookedAt) {
+  const Outcome run = run_with("clock", {"--set", "run.clock=realtime"});
+  EXPECT_EQ(run.exit_code, kGood);
+  ASSERT_TRUE(run.log.end.has_value());
+  const hil::LoopReport& loop = run.log.end->loop;
+  EXPECT_EQ(loop.due, 6U);
+  EXPECT_EQ(loop.sent + loop.skipped + loop.dropped, 6U);
+  EXPECT_GE(loop.sent, 1U) << "an hour forward would be the end of it at once";
+}
+
 /// A run in real time that would take 20 s, ended by a signal once it is on its way.
 Outcome ended_by(int signal) {
   const TemporaryFolder folder;
   process::Process run(small_run(folder.path(), {"run.clock=realtime", "run.duration_s=20"}));
-  for (std::string line = run.line(); !line.starts_with("frame"); line = run.line())
+  for (std::string line = run.line(); !line.starts_with("frame "); line = run.line())
     if (line.empty()) break;
   run.send(signal);
   Outcome outcome;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <starloop_test_paths.h>
 
 #include "drivers/mock_link.h"
 #include "tests/support/no_alloc.h"
@@ -68,7 +69,8 @@ class Bench {
     drivers::MockLink link(spec.width_px, spec.height_px);
     hil::ClosedLoopPointing pointing = starloop::make_pointing(scenario_, rig_, spec.start);
     hil::ManualClock clock(spec.start - spec.period);
-    auto loop = std::make_unique<hil::FrameLoop>(spec, clock, pointing, rig_.chain(), link, link);
+    auto loop =
+        std::make_unique<hil::FrameLoop>(spec, clock, pointing, rig_.generator(), link, link);
 
     Outcome out;
     std::jthread device([&link](const std::stop_token& stop) { answer_frames(link, stop); });

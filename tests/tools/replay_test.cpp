@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <starloop_test_paths.h>
 #include <nlohmann/json.hpp>
 
 #include "hil/run_log.h"

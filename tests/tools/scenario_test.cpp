@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <starloop_test_paths.h>
 
 namespace {
 

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <starloop_test_paths.h>
 #include <nlohmann/json.hpp>
 
 #include "tests/tools/program.h"

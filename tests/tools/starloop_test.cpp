@@ -9,8 +9,11 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <starloop_test_paths.h>
 #include <nlohmann/json.hpp>
 
+#include "engine/core/fits.h"
+#include "hil/frame_store.h"
 #include "tests/tools/program.h"
 
 namespace {
@@ -235,6 +238,41 @@ TEST(StarloopRun, HelpIsNoMistake) {
     EXPECT_EQ(run.exit_code, kGood);
     EXPECT_FALSE(run.out.empty());
   }
+}
+
+TEST(StarloopRun, APatternGoesOverEveryLinkAndComesBackFromItsLog) {
+  const TemporaryFolder folder;
+  const fs::path frames = folder.path() / "frames";
+  const Outcome run =
+      short_run(folder.path(), {"--pattern", "--no-pictures", "--set", "run.duration_s=0.5",
+                                "--set", "link.to=[\"mock\", \"file:" + frames.string() + "\"]"});
+  EXPECT_EQ(run.exit_code, kGood) << run.err;
+  const nlohmann::json report = report_of(folder.path());
+  EXPECT_TRUE(report.at("criteria_met").is_null()) << "there is nothing to judge";
+  EXPECT_EQ(report.at("links").at(0).at("name"), "mock");
+  EXPECT_EQ(report.at("links").at(1).at("sent"), 6);
+  EXPECT_EQ(report.at("links").at(1).at("failed"), 0);
+  for (std::uint64_t k = 0; k < 6; ++k) {
+    const auto image = engine::read_fits((frames / hil::frame_name(k, "fits")).string());
+    ASSERT_EQ(image.width(), 1024);
+    for (int v = 0; v < 1024; v += 11) {
+      for (int u = 0; u < 1024; u += 13) {
+        const auto i = static_cast<std::size_t>(1024 * v + u);
+        ASSERT_EQ(image.pixels()[i], (static_cast<std::uint64_t>(u + 3 * v) + 7 * k) % 2048);
+      }
+    }
+  }
+  const Outcome replay = starloop({"replay", (folder.path() / "latest").string()});
+  EXPECT_EQ(replay.exit_code, kGood) << replay.out << replay.err;
+  EXPECT_NE(replay.out.find("6 of 6 frames equal"), std::string::npos);
+}
+
+TEST(StarloopLinks, SaysWhatThereIsAndWhatIsMissing) {
+  const Outcome links = starloop({"links"});
+  EXPECT_EQ(links.exit_code, kGood);
+  for (const char* kind : {"mock ", "file ", "shm ", "v4l2 ", "usb "})
+    EXPECT_NE(links.out.find(kind), std::string::npos) << links.out;
+  EXPECT_NE(links.out.find("link.to=file:"), std::string::npos);
 }
 
 TEST(StarloopPasses, PrintsSixteenObjectsWithTheDocumentedKeys) {

@@ -5,6 +5,8 @@
 #include <benchmark/benchmark.h>
 
 #include "drivers/frame_packet.h"
+#include "drivers/pixel_packing.h"
+#include "drivers/usb_packet.h"
 #include "engine/core/random.h"
 #include "tools/starloop/scenario.h"
 
@@ -79,7 +81,7 @@ void bench_frame(benchmark::State& state) {
   double detector_s = 0;
   for (auto _ : state) {
     ++shot.sequence;
-    report = rig.chain().expose(shot, Budget{}, image, mask);
+    report = rig.generator().expose(shot, Budget{}, image, mask);
     render_s += seconds(report.times.render);
     optics_s += seconds(report.times.optics);
     detector_s += seconds(report.times.detector);
@@ -108,6 +110,54 @@ void bench_frame_packet(benchmark::State& state) {
   }
 }
 BENCHMARK(bench_frame_packet)->ArgName("and_decode")->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond);
+
+enum class Packing { kCopy, kPack, kUnpack, kPackPlain, kUnpackPlain };
+
+/// A frame's pixels, at 2 bytes each a second: packing against copying them.
+void bench_packing(benchmark::State& state, Packing how) {
+  std::vector<std::uint16_t> pixels(1024 * 1024);
+  for (std::size_t i = 0; i < pixels.size(); ++i) pixels[i] = static_cast<std::uint16_t>(i & 2047);
+  std::vector<std::uint16_t> copy(pixels.size());
+  std::vector<std::byte> packed(drivers::packed_bytes(pixels.size()));
+  drivers::pack_pixels(pixels, packed);
+  for (auto _ : state) {
+    switch (how) {
+      case Packing::kCopy:
+        std::copy(pixels.begin(), pixels.end(), copy.begin());
+        break;
+      case Packing::kPack:
+        drivers::pack_pixels(pixels, packed);
+        break;
+      case Packing::kUnpack:
+        drivers::unpack_pixels(packed, copy);
+        break;
+      case Packing::kPackPlain:
+        drivers::detail::pack_plain(pixels, packed);
+        break;
+      case Packing::kUnpackPlain:
+        drivers::detail::unpack_plain(packed, copy);
+        break;
+    }
+    benchmark::ClobberMemory();
+  }
+  state.SetBytesProcessed(state.iterations() * static_cast<std::int64_t>(2 * pixels.size()));
+}
+BENCHMARK_CAPTURE(bench_packing, copy, Packing::kCopy);
+BENCHMARK_CAPTURE(bench_packing, pack, Packing::kPack);
+BENCHMARK_CAPTURE(bench_packing, unpack, Packing::kUnpack);
+BENCHMARK_CAPTURE(bench_packing, pack_plain, Packing::kPackPlain);
+BENCHMARK_CAPTURE(bench_packing, unpack_plain, Packing::kUnpackPlain);
+
+void bench_usb_frame(benchmark::State& state) {
+  const DnImage image(1024, 1024);
+  hil::Frame frame;
+  frame.pixels = &image;
+  const auto format = static_cast<drivers::PixelFormat>(state.range(0));
+  std::vector<std::byte> bytes(drivers::kUsbHeaderBytes +
+                               drivers::usb_payload_bytes(format, 1024, 1024));
+  for (auto _ : state) benchmark::DoNotOptimize(drivers::encode_usb_frame(frame, format, bytes));
+}
+BENCHMARK(bench_usb_frame)->ArgName("packed")->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 

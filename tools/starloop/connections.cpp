@@ -9,28 +9,43 @@ using engine::Duration;
 
 constexpr Duration kPatience{20'000'000};
 
-drivers::OpenLink open(const Scenario& scenario, const hil::LoopSpec& loop) {
-  const bool must_keep = loop.when_busy == hil::WhenBusy::kWait;
-  return drivers::open_link(scenario.link, loop.width_px, loop.height_px,
-                            must_keep ? drivers::WhenFull::kWait : drivers::WhenFull::kDropOldest);
+drivers::LinkCamera camera_of(const hil::LoopSpec& loop) {
+  return {loop.width_px, loop.height_px, loop.bits, loop.period};
+}
+
+nlohmann::ordered_json json_of(const drivers::UsbCounts& c) {
+  return {{"connections", c.connections},
+          {"resets", c.resets},
+          {"halts", c.halts},
+          {"bad_messages", c.bad_messages},
+          {"in_errors", c.in_errors},
+          {"commands_lost", c.commands_lost},
+          {"device",
+           {{"good", c.device.good},
+            {"bad_headers", c.device.bad_headers},
+            {"bad_checksums", c.device.bad_checksums},
+            {"short", c.device.short_frames},
+            {"long", c.device.long_frames},
+            {"not_taken", c.device.not_taken}}}};
 }
 
 }  // namespace
 
 Connections::Connections(const Scenario& scenario, const hil::LoopSpec& loop)
-    : scenario_(scenario), loop_(loop), link_(open(scenario, loop)) {
+    : scenario_(scenario), loop_(loop), link_(scenario.link, camera_of(loop), loop.when_busy) {
   if (scenario.link.telemetry_row) row_.emplace(link_.frames(), loop.width_px);
+  std::vector<hil::CommandSource*> sources = link_.commands();
   if (scenario.port) {
     port_.emplace(*scenario.port);
-    merged_.emplace(link_.commands(), *port_);
+    sources.push_back(&*port_);
   }
+  if (sources.size() > 1) merged_.emplace(sources);
 }
 
 Connections::~Connections() = default;
 
 std::string Connections::text() const {
-  std::string text = link_.mock() != nullptr ? "frames go to the built-in tracker"
-                                             : "frames go to shared memory " + scenario_.link.name;
+  std::string text = link_.text();
   if (port_ && port_->udp_port() > 0) text += "; UDP port " + std::to_string(port_->udp_port());
   if (port_ && port_->tcp_port() > 0) text += "; TCP port " + std::to_string(port_->tcp_port());
   return text;
@@ -46,7 +61,7 @@ void Connections::start(hil::Clock& clock, const DeviceManner& manner) {
   faulty_frames_.emplace(scenario_.faults, hil::FaultySink::Shape{loop_.width_px, loop_.height_px},
                          loop_.start, link_with_row(), realtime ? &clock : nullptr);
   hil::CommandSource& commands =
-      merged_ ? static_cast<hil::CommandSource&>(*merged_) : link_.commands();
+      merged_ ? static_cast<hil::CommandSource&>(*merged_) : *link_.commands().front();
   const bool lockstep = scenario_.run.clock == ClockMode::kLockstep;
   faulty_commands_.emplace(
       scenario_.faults, commands, faulty_frames_->news(),
@@ -60,6 +75,7 @@ void Connections::start(hil::Clock& clock, const DeviceManner& manner) {
 void Connections::stop() {
   tracker_.request_stop();
   if (tracker_.joinable()) tracker_.join();
+  link_.finish();
 }
 
 hil::FrameSink& Connections::frames() noexcept {
@@ -123,6 +139,22 @@ nlohmann::ordered_json Connections::port_json() const {
   for (std::size_t i = 0; i < hil::kPortCounts; ++i)
     counts[name(static_cast<hil::PortCount>(i))] = now.values[i];
   return counts;
+}
+
+nlohmann::ordered_json Connections::links_json() const {
+  nlohmann::ordered_json links = nlohmann::ordered_json::array();
+  for (const drivers::LinkOutcome& o : link_.outcomes()) {
+    nlohmann::ordered_json link = {{"name", o.name}};
+    if (!o.first) {
+      link["sent"] = o.sent;
+      link["left_out"] = o.left_out;
+      link["failed"] = o.failed;
+      link["failure"] = o.failure;
+    }
+    if (o.usb) link["usb"] = json_of(*o.usb);
+    links.push_back(std::move(link));
+  }
+  return links;
 }
 
 }  // namespace starloop

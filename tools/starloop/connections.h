@@ -45,7 +45,7 @@ class Connections {
   [[nodiscard]] const hil::FrameSink& link() const noexcept { return link_.frames(); }
   /// Sets up the faults, which need the clock of the run, and starts the built-in tracker.
   void start(hil::Clock& clock, const DeviceManner& manner);
-  /// Ends the built-in tracker.
+  /// Ends the built-in tracker, and the links beside the first.
   void stop();
 
   [[nodiscard]] hil::FrameSink& frames() noexcept;
@@ -53,7 +53,8 @@ class Connections {
   [[nodiscard]] std::array<hil::FaultRing*, 2> faults() noexcept {
     return {&faulty_frames_->records(), &faulty_commands_->records()};
   }
-  /// report.json's "faults_injected" and "command_port". After the run.
+  /// report.json's "links", "faults_injected" and "command_port". After the run.
+  [[nodiscard]] nlohmann::ordered_json links_json() const;
   [[nodiscard]] nlohmann::ordered_json faults_json() const;
   [[nodiscard]] nlohmann::ordered_json port_json() const;
 

@@ -64,8 +64,8 @@ Flight::Result Flight::fly(const std::filesystem::path& folder, const DeviceMann
   connections_.start(pacing_.clock(), manner);
   hil::FanOut recorders(recorder, truth);
   hil::FanOut sinks(connections_.frames(), recorders);
-  const auto loop = std::make_unique<hil::FrameLoop>(spec, pacing_.clock(), pointing, rig_.chain(),
-                                                     sinks, connections_.commands());
+  const auto loop = std::make_unique<hil::FrameLoop>(
+      spec, pacing_.clock(), pointing, rig_.generator(), sinks, connections_.commands());
   Observer observer(scenario, {*loop, recorder, truth, connections_.faults()}, spec.frames,
                     plan_.quiet);
   run_loop(*loop, observer, pacing_, plan_.quiet);
@@ -75,6 +75,7 @@ Flight::Result Flight::fly(const std::filesystem::path& folder, const DeviceMann
   result.log = std::move(observer.log());
   result.kept = recorder.finish(result.log.loop);
   truth.finish();
+  result.links = connections_.links_json();
   result.faults_injected = connections_.faults_json();
   result.command_port = connections_.port_json();
   result.truth = truth.json();

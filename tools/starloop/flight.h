@@ -24,6 +24,7 @@ class Flight {
   struct Result {
     RunLog log;
     hil::RecorderReport kept;
+    nlohmann::ordered_json links;
     nlohmann::ordered_json faults_injected;
     nlohmann::ordered_json command_port;
     nlohmann::ordered_json truth;

@@ -69,6 +69,13 @@ int run_command(int argc, char** argv) {
   run_app->add_flag("--no-pictures", run.no_pictures,
                     "no contact sheet, no plots and no report.html: they take seconds");
 
+  run_app->add_flag(
+      "--pattern", run.pattern,
+      "a moving ramp instead of the scene, to check a cable (tools/check_pattern.py)");
+
+  CLI::App* links_app = app.add_subcommand(
+      "links", "List the links that this machine has, and what others would need");
+
   bool json = false;
   CLI::App* passes_app = app.add_subcommand("passes", "List when the camera can see the target");
   add_common(*passes_app, common);
@@ -113,6 +120,7 @@ int run_command(int argc, char** argv) {
   if (run_app->parsed()) return starloop::run_pass(common, run);
   if (soak_app->parsed()) return starloop::soak(common, soak);
   if (replay_app->parsed()) return starloop::replay_log(replay);
+  if (links_app->parsed()) return starloop::list_links();
   if (passes_app->parsed()) return starloop::list_passes(common, json);
   return starloop::render_frame(common, render);
 }

@@ -56,7 +56,7 @@ int render_frame(const CommonOptions& options, const RenderOptions& render) {
                    pointing.attitude(shot.shutter_open + shot.exposure)};
   engine::TruthMask mask;
   engine::DnImage frame(scenario.scene.camera.width_px, scenario.scene.camera.height_px);
-  const engine::FrameReport report = rig.chain().expose(shot, engine::Budget{}, frame, mask);
+  const engine::FrameReport report = rig.generator().expose(shot, engine::Budget{}, frame, mask);
 
   const std::filesystem::path fits(render.out);
   const std::string png = std::filesystem::path(fits).replace_extension(".png").string();

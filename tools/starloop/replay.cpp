@@ -2,7 +2,6 @@
 #include <filesystem>
 #include <map>
 #include <optional>
-#include <semaphore>
 #include <stop_token>
 #include <thread>
 
@@ -11,6 +10,7 @@
 #include "engine/core/crc32c.h"
 #include "engine/core/fits.h"
 #include "hil/frame_writer.h"
+#include "hil/no_commands.h"
 #include "tools/starloop/run_folder.h"
 #include "tools/starloop/subcommands.h"
 
@@ -62,18 +62,6 @@ class Comparison final : public hil::FrameSink {
   std::uint64_t without_ = 0;
   std::optional<std::uint64_t> first_other_;
   engine::DnImage other_pixels_;
-};
-
-/// A replay has no software under test.
-class NoCommands final : public hil::CommandSource {
- public:
-  engine::Expected<hil::Command> receive(Duration timeout) noexcept override {
-    static_cast<void>(never_.try_acquire_for(timeout));
-    return engine::Error{engine::Fault::kTimeout, 0, "replay"};
-  }
-
- private:
-  std::counting_semaphore<> never_{0};
 };
 
 /// The loop as the log tells it, as far as it tells it.
@@ -203,11 +191,11 @@ int replay_log(const ReplayOptions& options) {
                                                 hil::WhenBusy::kWait);
   }
   Comparison comparison(log, writer.get());
-  NoCommands commands;
+  hil::NoCommands commands;
   hil::ClosedLoopPointing pointing = make_pointing(scenario, rig, spec.start);
   hil::ManualClock clock(spec.start - spec.period);
-  const auto loop =
-      std::make_unique<hil::FrameLoop>(spec, clock, pointing, rig.chain(), comparison, commands);
+  const auto loop = std::make_unique<hil::FrameLoop>(spec, clock, pointing, rig.generator(),
+                                                     comparison, commands);
   static_cast<void>(run_loop(*loop));
   if (writer != nullptr) {
     writer->finish();

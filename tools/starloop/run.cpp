@@ -60,9 +60,12 @@ int failure_of(const hil::LoopReport& report, const RunSpec& run) {
 
 }  // namespace
 
-int run_pass(const CommonOptions& options, const RunOptions& run) {
-  const ScenarioSource source = read_source(options);
+int run_pass(const CommonOptions& options, RunOptions run) {
+  ScenarioSource source = read_source(options);
+  if (run.pattern) source.overrides.emplace_back("run.pattern=true");
   const Scenario scenario = load_scenario(source);
+  // There is nothing to point at, and nothing to judge.
+  run.open_loop = run.open_loop || scenario.run.pattern;
   const Flight::Plan plan{source, scenario, chosen_pass(scenario), run.open_loop, options.quiet};
   Rig rig(scenario, options.threads);
   Flight flight(plan, rig);
@@ -85,6 +88,7 @@ int run_pass(const CommonOptions& options, const RunOptions& run) {
                 .open_loop = run.open_loop,
                 .threads = rig.threads(),
                 .recorder = result.kept,
+                .links = result.links,
                 .faults_injected = result.faults_injected,
                 .command_port = result.command_port,
                 .truth = result.truth});

@@ -8,6 +8,7 @@
 #include "engine/scene/telescope.h"
 #include "hil/steady_clock.h"
 #include "hil/telemetry_row.h"
+#include "tools/starloop/pattern.h"
 
 namespace starloop {
 namespace {
@@ -35,6 +36,7 @@ RunSpec read_run(const ConfigTable& table) {
   run.pass = static_cast<std::size_t>(table.integer("pass", engine::at_least(1.0)));
   run.pass_where = table.where("pass");
   run.duration_s = table.number_or("duration_s", 0.0, engine::at_least(0.0));
+  run.pattern = table.flag_or("pattern", run.pattern);
   run.exposure = from_seconds(table.number("exposure_ms", engine::between(1e-3, 1e5)) * 1e-3);
   run.period = from_seconds(1.0 / table.number("frame_rate_hz", engine::between(0.01, 1000.0)));
   run.command_lead =
@@ -191,6 +193,10 @@ Rig::Rig(const Scenario& scenario, int threads)
       believed_target_(target_, scenario.target_knowledge),
       pool_(worker_threads(threads)) {
   const engine::DetectorSpec& detector = scenario.detector;
+  if (scenario.run.pattern) {
+    generator_ = std::make_unique<PatternGenerator>(detector.bits);
+    return;
+  }
   const double dark_e = detector.dark_e_s * engine::seconds(scenario.run.exposure);
   const double faint_w_m2 = kUnseenShareOfNoise * detector.noise_e(dark_e) /
                             detector.electrons_per_irradiance(scenario.run.exposure);
@@ -206,7 +212,7 @@ Rig::Rig(const Scenario& scenario, int threads)
   } catch (const engine::ConfigError& e) {
     throw engine::ConfigError(scenario.mesh_where + ": " + e.what());
   }
-  chain_ = std::make_unique<engine::ImagingChain>(
+  generator_ = std::make_unique<engine::ImagingChain>(
       engine::SnapshotBuilder(scenario.scene, camera_, target_), std::move(tracer),
       std::move(optics), engine::Detector(detector, pool_), detector, scenario.scene.camera,
       &hil::SteadyClock::stopwatch);

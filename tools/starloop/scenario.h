@@ -36,6 +36,7 @@ struct RunSpec {
   std::size_t pass = 1;    ///< counted from 1
   std::string pass_where;  ///< the place in the scenario that says so
   double duration_s = 0;   ///< 0: the whole pass
+  bool pattern = false;    ///< a test pattern instead of the scene
   engine::Duration exposure{};
   engine::Duration period{};
   engine::Duration command_lead{};
@@ -114,7 +115,7 @@ class Rig {
  public:
   Rig(const Scenario& scenario, int threads);
 
-  [[nodiscard]] engine::ImagingChain& chain() noexcept { return *chain_; }
+  [[nodiscard]] engine::SceneGenerator& generator() noexcept { return *generator_; }
   /// Without an error.
   [[nodiscard]] hil::ScriptedPointing prediction() const;
   /// As far as the target's orbit is known.
@@ -133,7 +134,7 @@ class Rig {
   hil::BelievedTarget believed_target_;
   engine::WorkerPool pool_;
   std::size_t triangles_ = 0;
-  std::unique_ptr<engine::ImagingChain> chain_;
+  std::unique_ptr<engine::SceneGenerator> generator_;
 };
 
 /// The camera that obeys, in a run that starts at `start`. The rig outlives it.

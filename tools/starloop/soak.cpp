@@ -57,6 +57,11 @@ std::uint64_t not_finite(const hil::FrameRecord& r) {
   return r.report.render.rejected_rays + (good ? 0U : 1U);
 }
 
+/// The reader that counts is the built-in one.
+bool audited(const Scenario& scenario) {
+  return scenario.link.to.front().kind == drivers::LinkKind::kMock;
+}
+
 void read_back(const fs::path& folder, SoakRound& round) {
   const hil::Recording log = hil::load_recording((folder / "record.slog").string());
   round.logged = log.frames.size();
@@ -69,7 +74,7 @@ SoakRound fly_round(const Flight::Plan& plan, int threads, bool slow, const fs::
   SoakRound round;
   round.slow_reader = slow;
   round.in_realtime = scenario.run.clock == ClockMode::kRealtime;
-  round.audited = scenario.link.kind == drivers::LinkKind::kMock;
+  round.audited = audited(scenario);
   Rig rig(scenario, threads);
   Flight flight(plan, rig);
   if (!flight.wait_for_reader()) {
@@ -118,8 +123,7 @@ int soak(const CommonOptions& options, const SoakOptions& spec) {
                               ": a soak must not have faults on purpose, got the table faults." +
                               scenario.faults.faults.front().name);
   const Flight::Plan plan{source, scenario, chosen_pass(scenario), false, true};
-  const bool can_be_slow =
-      scenario.run.clock == ClockMode::kRealtime && scenario.link.kind == drivers::LinkKind::kMock;
+  const bool can_be_slow = scenario.run.clock == ClockMode::kRealtime && audited(scenario);
   catch_signals();
   const fs::path folder = make_run_folder(spec.out, scenario.name + "-soak");
   spdlog::info("{}: pass {}, over and over for {:g} minutes; {}", scenario.name, scenario.run.pass,

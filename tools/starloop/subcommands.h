@@ -12,6 +12,9 @@ enum ExitCode : int { kGood = 0, kCriterionFailed = 1, kBadInput = 2, kDeviceFau
 /// Lists the passes of a scenario.
 int list_passes(const CommonOptions& options, bool as_json);
 
+/// Says which links this machine can do, and what the others need.
+int list_links();
+
 struct RenderOptions {
   double time_s = 0;
   std::string out = "frame.fits";
@@ -24,9 +27,10 @@ struct RunOptions {
   std::string out = "out";
   std::string compare;  ///< the folder of another run, for the plot
   bool no_pictures = false;
+  bool pattern = false;  ///< a test pattern instead of the scene; nothing is judged
 };
 /// Runs a pass as a loop.
-int run_pass(const CommonOptions& options, const RunOptions& run);
+int run_pass(const CommonOptions& options, RunOptions run);
 
 struct SoakOptions {
   double minutes = 10;

@@ -105,6 +105,7 @@ void write_report(const std::filesystem::path& folder, const Scenario& s, const 
         {"refused", l.refused.total()},
         {"refused_by_cause", refusals_json(l.refused)},
         {"lost", l.commands_lost}}},
+      {"links", facts.links},
       {"faults_injected", facts.faults_injected},
       {"command_port", facts.command_port},
       {"camera",

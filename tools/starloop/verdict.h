@@ -24,6 +24,7 @@ struct RunFacts {
   bool open_loop = false;
   int threads = 0;
   hil::RecorderReport recorder;
+  const nlohmann::ordered_json& links;
   const nlohmann::ordered_json& faults_injected;
   const nlohmann::ordered_json& command_port;
   const nlohmann::ordered_json& truth;
