@@ -17,7 +17,7 @@ namespace drivers {
 
 /// What a transfer of a frame carries at most: a multiple of every packet size there is. Six are a
 /// packed frame of 1024 x 1024.
-inline constexpr std::size_t kUsbTransferBytes = 256 * 1024;
+inline constexpr std::size_t kUsbTransferBytes = std::size_t{256} * 1024;
 inline constexpr std::size_t kUsbInTransfers = 4;
 /// What a message may take, rounded up to whole packets of any speed.
 inline constexpr std::size_t kUsbInBytes = 1024;
