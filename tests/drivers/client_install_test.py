@@ -66,7 +66,7 @@ class Install(unittest.TestCase):
         source = pathlib.Path(self.folder.name) / "project"
         source.mkdir()
         (source / "CMakeLists.txt").write_text(PROJECT, encoding="utf-8")
-        self.succeed(CMAKE, "-S", source, "-B", source / "build",
+        self.succeed(CMAKE, "-G", "Ninja", "-S", source, "-B", source / "build",
                      f"-DCMAKE_PREFIX_PATH={self.prefix}")
         self.succeed(CMAKE, "--build", source / "build")
         for kind in ("shared", "static"):
