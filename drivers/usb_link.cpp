@@ -123,7 +123,11 @@ Status UsbLink::send(const hil::Frame& frame, Duration timeout) noexcept {
     in_step_ = false;
     return Error{Fault::kDisconnected, 0, "usb: no device"};
   }
-  if (!in_step_) {
+  // Unplugged and back between two frames: the device knows nothing of the session.
+  const std::uint64_t connection = counts().connections;
+  if (!in_step_ || session_of_connection_ != connection) {
+    session_of_connection_ = connection;
+    in_step_ = false;
     if (const Status begun = begin_session(timeout); !begun.ok()) return begun;
   }
   {
@@ -135,6 +139,8 @@ Status UsbLink::send(const hil::Frame& frame, Duration timeout) noexcept {
   }
   const auto bytes = encode_usb_frame(frame, d.format, frame_);
   if (!bytes.ok()) return bytes.error();
+  if (bytes.value() > d.out.size() * kUsbTransferBytes)
+    return Error{Fault::kRejected, 0, "usb: a frame larger than the camera's"};
   ++begun_;
   const Status sent = transfer(bytes.value(), deadline);
   if (!sent.ok()) in_step_ = false;

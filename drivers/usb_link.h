@@ -1,7 +1,6 @@
 #pragma once
 
 #include <memory>
-
 #include <string>
 #include <thread>
 #include <vector>
@@ -77,9 +76,10 @@ class UsbLink final : public hil::FrameSink, public hil::CommandSource {
   std::unique_ptr<UsbPort> device_;
   // The sender's own.
   std::vector<std::byte> frame_;
-  std::uint32_t begun_ = 0;  // frames of this session
-  bool in_step_ = false;     // a session is on, and no frame of it failed
-  std::jthread keeper_;      // the last member: it uses the others
+  std::uint32_t begun_ = 0;                  // frames of this session
+  bool in_step_ = false;                     // a session is on, and no frame of it failed
+  std::uint64_t session_of_connection_ = 0;  // the session is this connection's
+  std::jthread keeper_;                      // the last member: it uses the others
 };
 
 /// A device with the interface, on a bus of this machine.

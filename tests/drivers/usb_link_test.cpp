@@ -187,6 +187,25 @@ TEST_F(UsbLinkTest, ADeviceThatIsUnpluggedIsTakenUpAgainWhenItComesBack) {
   expect_next(50);
 }
 
+TEST_F(UsbLinkTest, ADeviceThatWentAndCameBetweenTwoFramesGetsASessionOfItsOwn) {
+  device_.plug();
+  UsbLink link = make_link();
+  for (std::uint64_t k = 1; k <= 5; ++k) {
+    ASSERT_TRUE(send(link, k).ok());
+    expect_next(k);
+  }
+  device_.unplug();
+  wait_until([&] { return !link.has_reader(); });
+  device_.plug();
+  wait_until([&] { return link.has_reader(); });
+  for (std::uint64_t k = 6; k <= 20; ++k) {
+    const Status sent = send(link, k);
+    ASSERT_TRUE(sent.ok()) << k << ": " << sent.error().step;
+    expect_next(k);
+  }
+  EXPECT_EQ(link.counts().resets, 2U);
+}
+
 TEST_F(UsbLinkTest, ADeviceThatComesLaterIsWaitedFor) {
   UsbLink link = make_link();
   EXPECT_FALSE(link.has_reader());
