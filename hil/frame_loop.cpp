@@ -44,6 +44,7 @@ FrameLoop::FrameLoop(const LoopSpec& spec, Clock& clock, PointingSource& pointin
 
 LoopReport FrameLoop::run(const std::stop_token& stop) {
   LoopReport report;
+  run_time_.emplace();
   // In this order: where the system has no thread for the sender, the receiver ends by itself.
   std::jthread receiver([this](const std::stop_token& s) { receive_commands(s); });
   std::jthread sender([this](const std::stop_token& s) { send_frames(s); });
@@ -69,13 +70,15 @@ LoopReport FrameLoop::run(const std::stop_token& stop) {
 bool FrameLoop::run_frame(std::uint64_t k, const std::stop_token& stop, LoopReport& report) {
   if (spec_.trigger != nullptr && !wait_for_trigger(stop, report)) return false;
   ++report.due;
-  const bool in_time = skipped_before_ == 0 && clock_.now() <= opening(k);
+  Delay delay;
+  delay.in_time = skipped_before_ == 0 && clock_.now() <= opening(k);
+  delay.loop = run_time_->read();
   obey(k, report);
   FrameRecord record;
   record.sequence = k;
   record.shutter_open = opening(k);
   record.skipped_before = std::exchange(skipped_before_, 0);
-  wait_for_shutter(in_time, record, report);
+  wait_for_shutter(delay, record, report);
   std::size_t slot = 0;
   record.handed_over = acquire_slot(stop, slot);
   counts_ = {report.skipped, report.dropped, report.late, report.commands, {}};
@@ -97,16 +100,22 @@ bool FrameLoop::wait_for_trigger(const std::stop_token& stop, LoopReport& report
   return false;
 }
 
-void FrameLoop::wait_for_shutter(bool in_time, FrameRecord& record, LoopReport& report) noexcept {
+void FrameLoop::wait_for_shutter(Delay delay, FrameRecord& record, LoopReport& report) noexcept {
   record.late = clock_.sleep_until(record.shutter_open);
   const Duration woke = SteadyClock::stopwatch();
   if (record.late > kLateLimit) ++report.late;
-  const Duration delay =
-      record.late + spec_.period * static_cast<std::int64_t>(record.skipped_before);
+  delay.late = record.late + spec_.period * static_cast<std::int64_t>(record.skipped_before);
   // A loop that was at work lost its time anywhere since the frame before; one that slept, now.
-  const Duration from = in_time ? woke - delay : woke - delay - spec_.period;
-  const Duration held = held_up(from, woke);
-  if (delay > kLateLimit) record.late_cause = late_cause(delay, in_time, held);
+  const Duration from = woke - delay.late - (delay.in_time ? Duration{} : spec_.period);
+  delay.held_up = held_up(from, woke);
+  if (delay.late > kLateLimit) {
+    const std::optional<RunTime> now = run_time_->read();
+    if (now && delay.loop)
+      delay.loop = *now - *delay.loop;
+    else
+      delay.loop.reset();
+    record.late_cause = late_cause(delay);
+  }
   ++report.late_by_cause[static_cast<std::size_t>(record.late_cause)];
 }
 

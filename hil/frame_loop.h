@@ -2,6 +2,7 @@
 
 #include <array>
 #include <atomic>
+#include <optional>
 #include <semaphore>
 #include <stop_token>
 #include <vector>
@@ -9,6 +10,7 @@
 #include "engine/scene_generator.h"
 #include "hil/clock.h"
 #include "hil/command_gate.h"
+#include "hil/hiccup_meter.h"
 #include "hil/loop_report.h"
 #include "hil/pointing_source.h"
 #include "hil/spsc_ring.h"
@@ -82,9 +84,9 @@ class FrameLoop {
   /// Runs frame `k`; false: the run is over before its time.
   [[nodiscard]] bool run_frame(std::uint64_t k, const std::stop_token& stop, LoopReport& report);
   [[nodiscard]] bool wait_for_trigger(const std::stop_token& stop, LoopReport& report) noexcept;
-  /// Sleeps until the shutter opens, and finds out why it opens late when it does. `in_time`: the
-  /// work before was done.
-  void wait_for_shutter(bool in_time, FrameRecord& record, LoopReport& report) noexcept;
+  /// Sleeps until the shutter opens, and finds out why it opens late when it does. `delay` has what
+  /// is known before.
+  void wait_for_shutter(Delay delay, FrameRecord& record, LoopReport& report) noexcept;
   [[nodiscard]] engine::Duration held_up(engine::Duration from, engine::Duration to) noexcept;
   [[nodiscard]] std::uint64_t skip_missed(std::uint64_t k, LoopReport& report) noexcept;
   /// The same in a replay.
@@ -121,9 +123,10 @@ class FrameLoop {
   std::uint64_t skipped_before_ = 0;
   LoopCounts counts_;
   HiccupHistory hiccups_;
-  LoopReport sender_counts_;    // the sender's own until it is joined
-  LoopReport receiver_counts_;  // the receiver's own until it is joined
-  CommandGate gate_;            // the receiver's own until it is joined
+  std::optional<RunTimeMeter> run_time_;  // of the thread in run()
+  LoopReport sender_counts_;              // the sender's own until it is joined
+  LoopReport receiver_counts_;            // the receiver's own until it is joined
+  CommandGate gate_;                      // the receiver's own until it is joined
   std::array<std::atomic<std::uint64_t>, kRefusals> refused_now_{};  // receiver -> loop
   FrameRing frames_;                                                 // loop -> observer
   CommandRing applied_;                                              // loop -> observer

@@ -50,11 +50,6 @@ Duration HiccupHistory::within(Duration from, Duration to) const noexcept {
   return sum;
 }
 
-LateCause late_cause(Duration delay, bool in_time, Duration held_up) noexcept {
-  if (2 * held_up > delay) return LateCause::kMachine;
-  return in_time ? LateCause::kUnknown : LateCause::kOwnWork;
-}
-
 HiccupMeter::HiccupMeter(int priority)
     : due_(SteadyClock::stopwatch()),
       thread_([this, priority](const std::stop_token& stop) { measure(stop, priority); }) {}

@@ -51,20 +51,6 @@ class HiccupHistory {
   std::size_t next_ = 0;
 };
 
-/// Whose doing it is that a shutter opens late.
-enum class LateCause : std::uint8_t {
-  kNone,
-  kOwnWork,  ///< the frame before was not done
-  kMachine,  ///< the hiccup meter's thread was held up at the same time, for most of the delay
-  kUnknown,  ///< the loop was done in time and woke late, and the meter did not
-};
-inline constexpr int kLateCauses = 4;
-
-/// Of a delay in whose course the meter was held up for `held_up`. `in_time`: the loop had nothing
-/// left to do.
-[[nodiscard]] LateCause late_cause(engine::Duration delay, bool in_time,
-                                   engine::Duration held_up) noexcept;
-
 /// A thread that sleeps for a millisecond, over and over, and does nothing else. What delays it
 /// delays the loop as well, and is the machine's doing. Give it the highest priority there is:
 /// without one it also feels our own workers.

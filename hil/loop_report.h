@@ -5,7 +5,7 @@
 
 #include "engine/scene_generator.h"
 #include "hil/camera_link.h"
-#include "hil/hiccup_meter.h"
+#include "hil/late_cause.h"
 
 namespace hil {
 

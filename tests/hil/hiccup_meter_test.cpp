@@ -73,13 +73,6 @@ TEST(HiccupHistory, ForgetsTheOldestFirst) {
   EXPECT_EQ(history.within(Duration{}, Duration(430)), Duration{});
 }
 
-TEST(LateCause, IsTheMachineWhereTheMeterWasHeldUpForMostOfTheDelay) {
-  EXPECT_EQ(hil::late_cause(10 * kMillisecond, true, 6 * kMillisecond), LateCause::kMachine);
-  EXPECT_EQ(hil::late_cause(10 * kMillisecond, false, 6 * kMillisecond), LateCause::kMachine);
-  EXPECT_EQ(hil::late_cause(10 * kMillisecond, true, 4 * kMillisecond), LateCause::kUnknown);
-  EXPECT_EQ(hil::late_cause(10 * kMillisecond, false, 4 * kMillisecond), LateCause::kOwnWork);
-}
-
 /// Runs a loop in real time that says when its tenth frame has opened; 0: a stall of the whole
 /// process was laid at the machine's door, and nothing else was.
 int run_loop_that_is_stopped(int tell) {

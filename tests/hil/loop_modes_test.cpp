@@ -231,7 +231,7 @@ TEST(LateFrames, AFrameThatTookTooLongIsOurOwnDoing) {
     EXPECT_EQ(r.late_cause, r.skipped_before > 0 ? LateCause::kOwnWork : LateCause::kNone);
 }
 
-TEST(LateFrames, AWakeUpThatNothingExplainsIsUnknown) {
+TEST(LateFrames, AWakeUpThatComesLateWhileNothingOfOursRunsIsTheMachines) {
   Rig rig;
   fakes::HookedClock clock(kStart - kPeriod, {}, 2 * kMillisecond);
   fakes::PixelGenerator generator;
@@ -240,7 +240,7 @@ TEST(LateFrames, AWakeUpThatNothingExplainsIsUnknown) {
   FrameLoop loop(spec, clock, rig.pointing, generator, rig.sink, rig.silent);
   const LoopReport report = loop.run({});
   EXPECT_EQ(report.late, 10U);
-  EXPECT_EQ(report.late_by_cause[static_cast<std::size_t>(LateCause::kUnknown)], 10U);
+  EXPECT_EQ(report.late_by_cause[static_cast<std::size_t>(LateCause::kMachine)], 10U);
 }
 
 }  // namespace

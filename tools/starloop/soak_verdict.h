@@ -6,6 +6,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 
+#include "hil/hiccup_meter.h"
 #include "hil/loop_report.h"
 
 namespace starloop {
