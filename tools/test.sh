@@ -20,7 +20,7 @@ export ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=print_stacktrace=1
 export TSAN_OPTIONS="suppressions=$PWD/tests/tsan_suppressions.txt"
 # Whatever has threads; the rest would only take longer.
 threaded='FrameLoop|Lockstep|LoopGate|TriggeredLoop|LateFrames|LoopLatency|SpscRing|WorkerPool'
-threaded+='|MockLink|Shm|Usb|CommandPort|MergedCommands|Recorder|HiccupMeter|Faults|ImagingChain'
+threaded+='|MockLink|Shm|Usb|CommandPort|MergedCommands|Recorder|HiccupMeter|RunTimeMeter|Faults|FaultyLoop|ImagingChain'
 threaded+='|Tracker|ForeignProcess|StarloopSoak'
 
 if [[ "$full" == yes ]]; then
