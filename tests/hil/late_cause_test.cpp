@@ -98,7 +98,8 @@ TEST(RunTimeMeter, CountsWhatTheThreadRanAndWhatItWaitedForItsProcessor) {
   EXPECT_GT(used.ran, ran - 11 * kMs);
   EXPECT_LT(used.ran, ran + 11 * kMs);
   EXPECT_GT(used.queued, ran);
-  EXPECT_GT(used.process_ran, used.queued);
+  // The neighbours ran while it was queued, and perhaps other programs too.
+  EXPECT_GT(used.process_ran, used.ran + ran);
 }
 
 }  // namespace

@@ -9,42 +9,12 @@
 #include "hil/frame_loop.h"
 #include "hil/no_commands.h"
 #include "tests/support/fakes.h"
+#include "tests/support/small_loops.h"
 
 namespace {
 
-using engine::Duration;
-using engine::sim_time;
-using hil::Command;
-using hil::CommandKind;
-using hil::Frame;
-using hil::FrameLoop;
-using hil::FrameRecord;
+using namespace small_loops;
 using hil::LateCause;
-using hil::LoopReport;
-using hil::LoopSpec;
-
-constexpr Duration kPeriod{100'000'000};
-constexpr Duration kMillisecond{1'000'000};
-const engine::SimTime kStart = sim_time(1000.0);
-
-LoopSpec patient_loop(std::uint64_t frames) {
-  LoopSpec spec;
-  spec.start = kStart;
-  spec.period = kPeriod;
-  spec.frames = frames;
-  spec.width_px = 8;
-  spec.height_px = 2;
-  spec.when_busy = hil::WhenBusy::kWait;
-  return spec;
-}
-
-/// A loop with everything around it faked.
-struct Rig {
-  hil::ManualClock clock{kStart - kPeriod};
-  fakes::IdealPointing pointing;
-  fakes::Sink sink;
-  hil::NoCommands silent;
-};
 
 TEST(TriggeredLoop, MakesOneFrameForEachPullAndEndsWhenNobodyPullsAnyMore) {
   Rig rig;
