@@ -24,6 +24,12 @@ constexpr milliseconds kLookAgain{100};
 
 Duration now() noexcept { return hil::SteadyClock::stopwatch(); }
 
+/// Of a control request. Zero would be for ever.
+unsigned patience_ms(Duration timeout) noexcept {
+  return static_cast<unsigned>(
+      std::clamp<std::int64_t>(timeout / milliseconds(1), 10, kUsbControlTimeout_ms));
+}
+
 Error error_of(int code, const char* step) noexcept {
   switch (code) {
     case LIBUSB_ERROR_NO_DEVICE:
@@ -124,19 +130,15 @@ Status UsbLink::send(const hil::Frame& frame, Duration timeout) noexcept {
     return Error{Fault::kDisconnected, 0, "usb: no device"};
   }
   // Unplugged and back between two frames: the device knows nothing of the session.
-  const std::uint64_t connection = counts().connections;
-  if (!in_step_ || session_of_connection_ != connection) {
+  if (const std::uint64_t connection = counts().connections; session_of_connection_ != connection) {
     session_of_connection_ = connection;
     in_step_ = false;
-    if (const Status begun = begin_session(timeout); !begun.ok()) return begun;
   }
-  {
-    std::unique_lock lock(d.mutex);
-    const bool may = d.news.wait_for(lock, std::max(Duration{}, deadline - now()),
-                                     [&] { return d.gone || d.counts.device.credits > begun_; });
-    if (d.gone) return Error{Fault::kDisconnected, 0, "usb: the device is gone"};
-    if (!may) return Error{Fault::kBusy, 0, "usb: the device has no room"};
+  if (std::exchange(starved_, false) && in_step_) ask_status(deadline - now());
+  if (!in_step_) {
+    if (const Status begun = begin_session(deadline - now()); !begun.ok()) return begun;
   }
+  if (const Status may = wait_for_credit(deadline); !may.ok()) return may;
   const auto bytes = encode_usb_frame(frame, d.format, frame_);
   if (!bytes.ok()) return bytes.error();
   if (bytes.value() > d.out.size() * kUsbTransferBytes)
@@ -166,12 +168,10 @@ Status UsbLink::begin_session(Duration timeout) noexcept {
   }
   std::array<unsigned char, sizeof session> bytes{};
   std::memcpy(bytes.data(), &session, sizeof session);
-  const auto patience_ms = static_cast<unsigned>(
-      std::clamp<std::int64_t>(timeout / milliseconds(1), 10, kUsbControlTimeout_ms));
   const int code =
       libusb_control_transfer(d.handle, kUsbTell, static_cast<std::uint8_t>(UsbRequest::kReset), 0,
                               static_cast<std::uint16_t>(d.place.interface), bytes.data(),
-                              static_cast<std::uint16_t>(bytes.size()), patience_ms);
+                              static_cast<std::uint16_t>(bytes.size()), patience_ms(timeout));
   if (code < 0) {
     if (code == LIBUSB_ERROR_NO_DEVICE) {
       const std::lock_guard lock(d.mutex);
@@ -181,6 +181,38 @@ Status UsbLink::begin_session(Duration timeout) noexcept {
   }
   in_step_ = true;
   return Done{};
+}
+
+void UsbLink::ask_status(Duration timeout) noexcept {
+  UsbPort& d = *device_;
+  {
+    const std::lock_guard lock(d.mutex);
+    if (d.gone || d.counts.device.credits > begun_) return;  // the news were only late
+    ++d.counts.status_requests;
+  }
+  std::array<unsigned char, kLargestUsbMessage> bytes{};
+  const int n =
+      libusb_control_transfer(d.handle, kUsbAsk, static_cast<std::uint8_t>(UsbRequest::kStatus), 0,
+                              static_cast<std::uint16_t>(d.place.interface), bytes.data(),
+                              static_cast<std::uint16_t>(bytes.size()), patience_ms(timeout));
+  if (n == LIBUSB_ERROR_NO_DEVICE) {
+    const std::lock_guard lock(d.mutex);
+    d.gone = true;
+  }
+  // An answer of another session: the device was started anew, and waits for a reset.
+  if (n > 0 && !d.take_message(std::as_bytes(std::span(bytes)).first(static_cast<std::size_t>(n))))
+    in_step_ = false;
+}
+
+Status UsbLink::wait_for_credit(Duration deadline) noexcept {
+  UsbPort& d = *device_;
+  std::unique_lock lock(d.mutex);
+  const bool may = d.news.wait_for(lock, std::max(Duration{}, deadline - now()),
+                                   [&] { return d.gone || d.counts.device.credits > begun_; });
+  if (d.gone) return Error{Fault::kDisconnected, 0, "usb: the device is gone"};
+  if (may) return Done{};
+  starved_ = true;
+  return Error{Fault::kBusy, 0, "usb: the device has no room"};
 }
 
 Status UsbLink::transfer(std::size_t bytes, Duration deadline) noexcept {

@@ -22,12 +22,13 @@ struct UsbSpec {
 /// What became of the cable so far.
 struct UsbCounts {
   std::uint64_t connections = 0;
-  std::uint64_t resets = 0;         ///< sessions begun
-  std::uint64_t halts = 0;          ///< endpoints that stalled, and were cleared
-  std::uint64_t bad_messages = 0;   ///< that were none, or of an older session
-  std::uint64_t in_errors = 0;      ///< transfers of the bulk IN endpoint that failed
-  std::uint64_t commands_lost = 0;  ///< nobody took them in time
-  UsbStatus device;                 ///< its own words, of this session
+  std::uint64_t resets = 0;           ///< sessions begun
+  std::uint64_t halts = 0;            ///< endpoints that stalled, and were cleared
+  std::uint64_t bad_messages = 0;     ///< that were none, or of an older session
+  std::uint64_t status_requests = 0;  ///< for want of a credit
+  std::uint64_t in_errors = 0;        ///< transfers of the bulk IN endpoint that failed
+  std::uint64_t commands_lost = 0;    ///< nobody took them in time
+  UsbStatus device;                   ///< its own words, of this session
 };
 
 struct UsbPort;  // libusb's things: usb_port.h
@@ -37,9 +38,11 @@ struct UsbPort;  // libusb's things: usb_port.h
 ///
 /// A frame goes out as several transfers that are all in flight; send() returns when the last has
 /// ended, so what it says is what happened. A frame is begun only with the device's credit: where
-/// that does not come the answer is kBusy, and nothing of the frame was sent. After a frame that
-/// failed half way the next begins a new session, which puts both sides in step. A device that is
-/// unplugged is looked for ten times a second; frames without it are kDisconnected.
+/// that does not come the answer is kBusy, and nothing of the frame was sent; the next frame asks
+/// for the status first, for the message that had the credit may have been lost. After a frame that
+/// failed half way, or when the device knows nothing of the session, the next begins a new one,
+/// which puts both sides in step. A device that is unplugged is looked for ten times a second;
+/// frames without it are kDisconnected.
 ///
 /// Thread: sender for send(), receiver for receive(), one of its own for libusb's events. Loop-safe
 /// once made.
@@ -65,6 +68,9 @@ class UsbLink final : public hil::FrameSink, public hil::CommandSource {
  private:
   void keep(const std::stop_token& stop) noexcept;
   [[nodiscard]] engine::Status begin_session(engine::Duration timeout) noexcept;
+  /// Has the device say its credits once more, by a request of its own.
+  void ask_status(engine::Duration timeout) noexcept;
+  [[nodiscard]] engine::Status wait_for_credit(engine::Duration deadline) noexcept;
   /// The frame in frame_, as transfers.
   [[nodiscard]] engine::Status transfer(std::size_t bytes, engine::Duration deadline) noexcept;
 
@@ -78,6 +84,7 @@ class UsbLink final : public hil::FrameSink, public hil::CommandSource {
   std::vector<std::byte> frame_;
   std::uint32_t begun_ = 0;                  // frames of this session
   bool in_step_ = false;                     // a session is on, and no frame of it failed
+  bool starved_ = false;                     // the last frame found no credit
   std::uint64_t session_of_connection_ = 0;  // the session is this connection's
   std::jthread keeper_;                      // the last member: it uses the others
 };

@@ -208,7 +208,8 @@ void UsbPort::submit_idle_in() noexcept {
 void UsbPort::in_ended(libusb_transfer* t) noexcept {
   const auto i = static_cast<std::size_t>(std::find(in.begin(), in.end(), t) - in.begin());
   if (t->status == LIBUSB_TRANSFER_COMPLETED && t->actual_length > 0)
-    take_message(std::as_bytes(std::span(t->buffer, static_cast<std::size_t>(t->actual_length))));
+    static_cast<void>(take_message(
+        std::as_bytes(std::span(t->buffer, static_cast<std::size_t>(t->actual_length)))));
   bool again = t->status == LIBUSB_TRANSFER_COMPLETED;
   {
     const std::lock_guard lock(mutex);
@@ -233,20 +234,22 @@ void UsbPort::in_ended(libusb_transfer* t) noexcept {
   news.notify_all();
 }
 
-void UsbPort::take_message(std::span<const std::byte> bytes) noexcept {
+bool UsbPort::take_message(std::span<const std::byte> bytes) noexcept {
   const auto message = decode_usb_message(bytes);
   const std::lock_guard lock(mutex);
   if (!message.ok() || message.value().session != session) {
     ++counts.bad_messages;
-    return;
+    return false;
   }
   const UsbMessage& m = message.value();
   if (m.kind == UsbMessage::Kind::kStatus) {
-    counts.device = m.status;
+    // One that was asked for may overtake one on bulk IN: credits only grow.
+    if (m.status.credits >= counts.device.credits) counts.device = m.status;
     news.notify_all();
   } else if (!packets.push(m.command, static_cast<std::uint32_t>(counts.connections)).ok()) {
     ++counts.commands_lost;
   }
+  return true;
 }
 
 void UsbPort::out_ended(libusb_transfer* t) noexcept {

@@ -61,7 +61,8 @@ struct UsbPort {
   void submit_idle_in() noexcept;
   void out_ended(libusb_transfer* t) noexcept;
   void in_ended(libusb_transfer* t) noexcept;
-  void take_message(std::span<const std::byte> bytes) noexcept;
+  /// False: it is none, or of another session.
+  bool take_message(std::span<const std::byte> bytes) noexcept;
   void handle_events(std::chrono::milliseconds timeout) noexcept;
 
   PacketQueue& packets;

@@ -123,6 +123,53 @@ TEST_F(UsbLinkTest, WithoutACreditNothingIsSentAndTheSenderIsBusy) {
   EXPECT_EQ(device_.resets(), 1) << "a device without room is in step";
 }
 
+TEST_F(UsbLinkTest, ACreditWhoseMessageWasLostIsAskedFor) {
+  device_.plug();
+  UsbLink link = make_link();
+  ASSERT_TRUE(send(link, 1).ok());
+  ASSERT_TRUE(send(link, 2).ok());
+  device_.lose_messages(true);
+  expect_next(1);
+  expect_next(2);
+  wait_until([&] { return device_.messages_lost() > 0; });
+  device_.lose_messages(false);
+  EXPECT_EQ(send(link, 3, kShort).error().fault, Fault::kBusy);
+  for (std::uint64_t k = 4; k <= 6; ++k) {
+    const Status sent = send(link, k);
+    ASSERT_TRUE(sent.ok()) << k << ": " << sent.error().step;
+    expect_next(k);
+  }
+  EXPECT_EQ(link.counts().status_requests, 1U);
+  EXPECT_EQ(device_.resets(), 1);
+}
+
+TEST_F(UsbLinkTest, ADeviceThatHasNoRoomIsAskedOnceAFrameAndNoFrameIsBegun) {
+  device_.plug();
+  UsbLink link = make_link();
+  ASSERT_TRUE(send(link, 1).ok());
+  ASSERT_TRUE(send(link, 2).ok());
+  for (std::uint64_t k = 3; k <= 6; ++k) {
+    EXPECT_EQ(send(link, k, kShort).error().fault, Fault::kBusy);
+    EXPECT_EQ(link.counts().status_requests, k - 3);
+  }
+  EXPECT_EQ(device_status().good, 2U);
+  EXPECT_EQ(device_.resets(), 1);
+}
+
+TEST_F(UsbLinkTest, ADeviceThatForgotTheSessionGetsANewOne) {
+  device_.plug();
+  UsbLink link = make_link();
+  ASSERT_TRUE(send(link, 1).ok());
+  ASSERT_TRUE(send(link, 2).ok());
+  // Its software was started anew, and its place on the bus is the same.
+  device_.with([](drivers::FrameIntake& intake) { intake.reset(0); });
+  EXPECT_EQ(send(link, 3, kShort).error().fault, Fault::kBusy);
+  const Status next = send(link, 4);
+  ASSERT_TRUE(next.ok()) << next.error().step;
+  expect_next(4);
+  EXPECT_EQ(link.counts().resets, 2U);
+}
+
 TEST_F(UsbLinkTest, AfterAStallInAFrameTheNextOneArrives) {
   device_.plug();
   UsbLink link = make_link();

@@ -90,6 +90,8 @@ struct UsbDeviceModel::Self {
   bool halted = false;
   std::deque<int> in_errors;
   std::deque<std::vector<std::byte>> said;
+  bool loses = false;
+  int lost = 0;
   int resets = 0;
 };
 
@@ -208,12 +210,13 @@ bool UsbDeviceModel::Self::out(Urb& u) {
 }
 
 void UsbDeviceModel::Self::fill_in() {
+  std::array<std::byte, drivers::kLargestUsbMessage> message{};
+  while (loses && intake.next_message(message) > 0) ++lost;
   for (auto it = under_way.begin(); it != under_way.end();) {
     if (it->urb().endpoint != kIn) {
       ++it;
       continue;
     }
-    std::array<std::byte, drivers::kLargestUsbMessage> message{};
     std::vector<std::byte> bytes;
     int status = 0;
     if (!in_errors.empty()) {
@@ -350,6 +353,16 @@ void UsbDeviceModel::fail_next_in(int error) {
 void UsbDeviceModel::say(std::vector<std::byte> bytes) {
   const std::lock_guard lock(self_->mutex);
   self_->said.push_back(std::move(bytes));
+}
+
+void UsbDeviceModel::lose_messages(bool lose) {
+  const std::lock_guard lock(self_->mutex);
+  self_->loses = lose;
+}
+
+int UsbDeviceModel::messages_lost() const {
+  const std::lock_guard lock(self_->mutex);
+  return self_->lost;
 }
 
 int UsbDeviceModel::resets() const {

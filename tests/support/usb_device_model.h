@@ -35,6 +35,9 @@ class UsbDeviceModel {
   void fail_next_in(int error);
   /// The next bulk IN transfer has these bytes, whatever they are.
   void say(std::vector<std::byte> bytes);
+  /// What the device has to say is lost on its way, while `lose` holds; said is said.
+  void lose_messages(bool lose);
+  [[nodiscard]] int messages_lost() const;
   /// Resets so far.
   [[nodiscard]] int resets() const;
 

@@ -18,6 +18,7 @@ nlohmann::ordered_json json_of(const drivers::UsbCounts& c) {
           {"resets", c.resets},
           {"halts", c.halts},
           {"bad_messages", c.bad_messages},
+          {"status_requests", c.status_requests},
           {"in_errors", c.in_errors},
           {"commands_lost", c.commands_lost},
           {"device",
