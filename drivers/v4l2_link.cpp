@@ -14,6 +14,9 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
+#include "engine/core/crc32c.h"
+#include "hil/telemetry_row.h"
+
 namespace drivers {
 namespace {
 
@@ -114,7 +117,8 @@ V4l2Link::V4l2Link(const V4l2Spec& spec, int width_px, int rows, int bits)
       bits_(bits),
       frame_bytes_(static_cast<std::size_t>(width_px) * static_cast<std::size_t>(rows) *
                    (spec.format == V4l2Format::kY16 ? 2U : 1U)),
-      frame_(frame_bytes_) {
+      frame_(frame_bytes_),
+      row_(static_cast<std::size_t>(width_px)) {
   if (find_v4l2_node(spec.device).empty()) {
     const std::string label = spec.device.starts_with("/") ? "starloop" : spec.device;
     fail("there is no " + spec.device +
@@ -236,23 +240,38 @@ bool V4l2Link::reopen() noexcept {
   return file_ >= 0;
 }
 
-void V4l2Link::convert(const hil::Frame& frame, std::byte* out) const noexcept {
+void V4l2Link::convert(const hil::Frame& frame, std::byte* out) noexcept {
   const std::span<const std::uint16_t> image = frame.pixels->pixels();
-  const std::span<const std::uint16_t> row = frame.telemetry_row;
+  std::span<const std::uint16_t> row = frame.telemetry_row;
   if (spec_.format == V4l2Format::kGrey) {
     const int down = std::max(0, bits_ - 8);
     const auto to_byte = [](int shift) {
       return [shift](std::uint16_t dn) { return static_cast<std::byte>(dn >> shift); };
     };
-    out = std::transform(image.begin(), image.end(), out, to_byte(down));
-    std::transform(row.begin(), row.end(), out, to_byte(0));
+    std::byte* below = std::transform(image.begin(), image.end(), out, to_byte(down));
+    row = own_row(row, {out, below});
+    std::transform(row.begin(), row.end(), below, to_byte(0));
     return;
   }
   auto* words = reinterpret_cast<std::uint16_t*>(out);
   const int up = spec_.to_top ? 16 - bits_ : 0;
-  words = std::transform(image.begin(), image.end(), words,
-                         [up](std::uint16_t dn) { return static_cast<std::uint16_t>(dn << up); });
-  std::copy(row.begin(), row.end(), words);
+  auto* below = std::transform(image.begin(), image.end(), words, [up](std::uint16_t dn) {
+    return static_cast<std::uint16_t>(dn << up);
+  });
+  if (up > 0) row = own_row(row, std::as_bytes(std::span(words, below)));
+  std::copy(row.begin(), row.end(), below);
+}
+
+/// The frame's own row, with the checksum of what became of the image; one that is no telemetry
+/// stays as it is.
+std::span<const std::uint16_t> V4l2Link::own_row(std::span<const std::uint16_t> row,
+                                                 std::span<const std::byte> image) noexcept {
+  const auto decoded = hil::decode_telemetry_row(row);
+  if (!decoded.ok() || row.size() != row_.size()) return row;
+  hil::TelemetryRow telemetry = decoded.value();
+  telemetry.image_crc32c = engine::crc32c(image);
+  static_cast<void>(hil::encode_telemetry_row(telemetry, row_));
+  return row_;
 }
 
 Status V4l2Link::send(const hil::Frame& frame, Duration timeout) noexcept {

@@ -37,7 +37,8 @@ struct V4l2Spec {
 /// in turn and does not heed the index that the driver gives back, which is the wrong one. The
 /// driver has no owners of buffers: a reader that keeps one for longer than the ring lasts can see
 /// it change, and knows by the checksum of the telemetry row; one that gives it back in time
-/// cannot. A telemetry row goes out as it is, whatever becomes of the pixels.
+/// cannot. A telemetry row goes out value for value, whatever becomes of the pixels; its checksum
+/// of the image is that of the bytes that go out.
 ///
 /// A node that goes away is looked for at each frame. Thread: sender. Loop-safe once made.
 class V4l2Link final : public hil::FrameSink {
@@ -67,7 +68,9 @@ class V4l2Link final : public hil::FrameSink {
   void map_buffers();
   [[nodiscard]] bool stream_on() noexcept;
   [[nodiscard]] bool reopen() noexcept;
-  void convert(const hil::Frame& frame, std::byte* out) const noexcept;
+  void convert(const hil::Frame& frame, std::byte* out) noexcept;
+  [[nodiscard]] std::span<const std::uint16_t> own_row(std::span<const std::uint16_t> row,
+                                                       std::span<const std::byte> image) noexcept;
   [[nodiscard]] engine::Status write_frame() noexcept;
   [[nodiscard]] engine::Status queue_frame(const hil::Frame& frame,
                                            engine::Duration timeout) noexcept;
@@ -84,6 +87,7 @@ class V4l2Link final : public hil::FrameSink {
   bool mapped_ = false;
   bool streams_ = false;
   std::vector<std::byte> frame_;  // for write()
+  std::vector<std::uint16_t> row_;
   std::vector<Buffer> buffers_;
   std::size_t next_buffer_ = 0;
   std::size_t given_ = 0;  // buffers that the driver has

@@ -20,8 +20,9 @@ static_assert(std::endian::native == std::endian::little, "the row is written as
 using Bytes = std::array<std::byte, kTelemetryRowPixels>;
 
 constexpr char kMagic[4] = {'S', 'L', 'T', 'R'};
-constexpr std::byte kVersion{1};
-constexpr std::size_t kCrcAt = 48;
+constexpr std::byte kVersion{2};
+constexpr std::size_t kImageCrcAt = 48;
+constexpr std::size_t kCrcAt = 52;
 
 std::int64_t ns(SimTime t) noexcept { return t.time_since_epoch().count(); }
 
@@ -50,13 +51,14 @@ TelemetryRow telemetry_of(const Frame& frame, std::uint64_t link_sequence) noexc
           .exposure_start = frame.shutter_open,
           .exposure_middle = frame.shutter_open + frame.exposure / 2,
           .exposure_end = frame.shutter_open + frame.exposure,
-          .link_sequence = link_sequence};
+          .link_sequence = link_sequence,
+          .image_crc32c = engine::crc32c(std::as_bytes(frame.pixels->pixels()))};
 }
 
 engine::Status encode_telemetry_row(const TelemetryRow& telemetry,
                                     std::span<std::uint16_t> row) noexcept {
   if (row.size() < kTelemetryRowPixels)
-    return rejected("a telemetry row needs a camera at least 52 pixels wide");
+    return rejected("a telemetry row needs a camera at least 56 pixels wide");
   Bytes bytes{};
   put(bytes, 0, kMagic);
   bytes[4] = kVersion;
@@ -66,6 +68,7 @@ engine::Status encode_telemetry_row(const TelemetryRow& telemetry,
   put(bytes, 24, ns(telemetry.exposure_middle));
   put(bytes, 32, ns(telemetry.exposure_end));
   put(bytes, 40, telemetry.link_sequence);
+  put(bytes, kImageCrcAt, telemetry.image_crc32c);
   put(bytes, kCrcAt, engine::crc32c(std::span(bytes).first(kCrcAt)));
   const auto rest = std::transform(bytes.begin(), bytes.end(), row.begin(),
                                    [](std::byte b) { return static_cast<std::uint16_t>(b); });
@@ -93,7 +96,8 @@ engine::Expected<TelemetryRow> decode_telemetry_row(std::span<const std::uint16_
                       .exposure_start = time_at(bytes, 16),
                       .exposure_middle = time_at(bytes, 24),
                       .exposure_end = time_at(bytes, 32),
-                      .link_sequence = get<std::uint64_t>(bytes, 40)};
+                      .link_sequence = get<std::uint64_t>(bytes, 40),
+                      .image_crc32c = get<std::uint32_t>(bytes, kImageCrcAt)};
 }
 
 }  // namespace hil

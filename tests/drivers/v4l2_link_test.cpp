@@ -12,6 +12,8 @@
 #include <gtest/gtest.h>
 #include <linux/videodev2.h>
 
+#include "engine/core/crc32c.h"
+#include "hil/telemetry_row.h"
 #include "tests/support/usb_frames.h"
 #include "tests/support/v4l2_node_model.h"
 
@@ -152,6 +154,39 @@ TEST(V4l2Link, ATelemetryRowGoesOutAsItIs) {
     }
     // Without the row it is a frame of another size.
     EXPECT_EQ(send(link, 1).error().fault, Fault::kRejected);
+  }
+}
+
+// What a reader of the node checks is what lies in the node.
+TEST(V4l2Link, ATelemetryRowHasTheChecksumOfTheImageAsItGoesOut) {
+  V4l2NodeModel node({});
+  node.plug();
+  const auto image = usb_frames::image(4);
+  hil::Frame frame = usb_frames::frame(4, image);
+  std::vector<std::uint16_t> row(kWidth);
+  const hil::TelemetryRow telemetry = hil::telemetry_of(frame, 9);
+  ASSERT_TRUE(hil::encode_telemetry_row(telemetry, row).ok());
+  frame.telemetry_row = row;
+  for (const V4l2Format format : {V4l2Format::kGrey, V4l2Format::kY16}) {
+    for (const bool to_top : {true, false}) {
+      V4l2Spec spec;
+      spec.format = format;
+      spec.to_top = to_top;
+      V4l2Link link(spec, kWidth, kHeight + 1, 11);
+      ASSERT_TRUE(link.send(frame, kShort).ok());
+      const auto bytes = node.frames().back();
+      const std::size_t image_bytes = bytes.size() / (kHeight + 1) * kHeight;
+      std::vector<std::uint16_t> below(kWidth);
+      for (std::size_t i = 0; i < below.size(); ++i)
+        below[i] = format == V4l2Format::kGrey
+                       ? std::to_integer<std::uint16_t>(bytes[image_bytes + i])
+                       : words(bytes)[image_bytes / 2 + i];
+      const auto read = hil::decode_telemetry_row(below);
+      ASSERT_TRUE(read.ok()) << read.error().step;
+      EXPECT_EQ(read.value().image_crc32c, engine::crc32c(std::span(bytes).first(image_bytes)));
+      EXPECT_EQ(read.value().frame_id, 4U);
+      EXPECT_EQ(read.value().link_sequence, 9U);
+    }
   }
 }
 

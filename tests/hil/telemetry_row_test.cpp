@@ -29,7 +29,8 @@ TelemetryRow example() {
           .exposure_start = at_ns(-5),
           .exposure_middle = at_ns(309'761'630'162'629),
           .exposure_end = at_ns(std::numeric_limits<std::int64_t>::max()),
-          .link_sequence = 42};
+          .link_sequence = 42,
+          .image_crc32c = 0xC0DEC0DE};
 }
 
 Row encoded(const TelemetryRow& telemetry, std::size_t width) {
@@ -44,7 +45,7 @@ std::string refusal(const Row& row) {
 }
 
 TEST(TelemetryRow, EveryFieldComesBackAtEveryWidth) {
-  for (const std::size_t width : {kTelemetryRowPixels, std::size_t{53}, std::size_t{1024}}) {
+  for (const std::size_t width : {kTelemetryRowPixels, std::size_t{57}, std::size_t{1024}}) {
     const auto decoded = decode_telemetry_row(encoded(example(), width));
     ASSERT_TRUE(decoded.ok()) << decoded.error().step;
     EXPECT_EQ(decoded.value(), example());
@@ -66,18 +67,20 @@ TEST(TelemetryRow, FieldsLieWhereTheHeaderSays) {
   telemetry.exposure_middle = at_ns(0x22);
   telemetry.exposure_end = at_ns(0x33);
   telemetry.link_sequence = 0x44;
+  telemetry.image_crc32c = 0x55;
   const Row row = encoded(telemetry, 60);
-  EXPECT_EQ(Row(row.begin(), row.begin() + 8), (Row{'S', 'L', 'T', 'R', 1, 52, 0, 0}));
+  EXPECT_EQ(Row(row.begin(), row.begin() + 8), (Row{'S', 'L', 'T', 'R', 2, 56, 0, 0}));
   EXPECT_EQ(Row(row.begin() + 8, row.begin() + 16), (Row{8, 7, 6, 5, 4, 3, 2, 1}));
   EXPECT_EQ(row[16], 0x11);
   EXPECT_EQ(row[24], 0x22);
   EXPECT_EQ(row[32], 0x33);
   EXPECT_EQ(row[40], 0x44);
-  std::vector<std::byte> bytes(48);
-  std::transform(row.begin(), row.begin() + 48, bytes.begin(),
+  EXPECT_EQ(row[48], 0x55);
+  std::vector<std::byte> bytes(52);
+  std::transform(row.begin(), row.begin() + 52, bytes.begin(),
                  [](std::uint16_t dn) { return static_cast<std::byte>(dn); });
   const std::uint32_t crc = engine::crc32c(bytes);
-  for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(row[48 + i], crc >> (8 * i) & 0xFFU);
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(row[52 + i], crc >> (8 * i) & 0xFFU);
 }
 
 TEST(TelemetryRow, ACameraTooNarrowIsRefusedByBothSides) {
@@ -85,7 +88,7 @@ TEST(TelemetryRow, ACameraTooNarrowIsRefusedByBothSides) {
     Row row(width);
     const auto status = encode_telemetry_row(example(), row);
     ASSERT_FALSE(status.ok()) << width;
-    EXPECT_STREQ(status.error().step, "a telemetry row needs a camera at least 52 pixels wide");
+    EXPECT_STREQ(status.error().step, "a telemetry row needs a camera at least 56 pixels wide");
     EXPECT_EQ(refusal(row), "width of a telemetry row");
   }
 }
@@ -120,11 +123,32 @@ TEST(TelemetryRow, AFrameSaysItsStartMiddleAndEnd) {
   frame.sequence = 9;
   frame.shutter_open = at_ns(1'000);
   frame.exposure = Duration(500);
+  engine::DnImage nothing(0, 0);
+  frame.pixels = &nothing;
   EXPECT_EQ(hil::telemetry_of(frame, 7), (TelemetryRow{.frame_id = 9,
                                                        .exposure_start = at_ns(1'000),
                                                        .exposure_middle = at_ns(1'250),
                                                        .exposure_end = at_ns(1'500),
                                                        .link_sequence = 7}));
+}
+
+TEST(TelemetryRow, TheChecksumOfTheImageIsOfItsBytesAndOfEachOfThem) {
+  engine::DnImage image(9, 1);
+  // The check value of CRC-32C is that of the text "123456789", here with zeros between.
+  std::vector<std::byte> bytes;
+  for (std::uint16_t i = 0; i < 9; ++i) {
+    image.pixels()[i] = static_cast<std::uint16_t>('1' + i);
+    bytes.push_back(static_cast<std::byte>('1' + i));
+    bytes.push_back(std::byte{0});
+  }
+  hil::Frame frame;
+  frame.pixels = &image;
+  EXPECT_EQ(hil::telemetry_of(frame, 0).image_crc32c, engine::crc32c(bytes));
+  for (std::uint16_t& dn : image.pixels()) {
+    dn ^= 0x400U;
+    EXPECT_NE(hil::telemetry_of(frame, 0).image_crc32c, engine::crc32c(bytes));
+    dn ^= 0x400U;
+  }
 }
 
 }  // namespace

@@ -158,7 +158,7 @@ Scenario read_scenario(const ConfigReader& config) {
   if (s.link.telemetry_row &&
       (s.scene.camera.width_px < static_cast<int>(hil::kTelemetryRowPixels) ||
        s.detector.bits < hil::kTelemetryRowBits)) {
-    config.table("link").fail("telemetry_row", "needs a camera of at least 52 columns and 8 bits");
+    config.table("link").fail("telemetry_row", "needs a camera of at least 56 columns and 8 bits");
   }
   s.port = hil::read_command_port(config.table("command_port"));
   s.faults = hil::read_faults(config, s.scene.seed, s.scene.camera.width_px, s.detector.bits);
