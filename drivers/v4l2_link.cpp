@@ -169,19 +169,24 @@ void V4l2Link::negotiate() {
   p.pixelformat = wanted;
   p.field = V4L2_FIELD_NONE;
   p.colorspace = V4L2_COLORSPACE_RAW;
-  p.bytesperline = static_cast<std::uint32_t>(frame_bytes_ / static_cast<std::size_t>(rows_));
+  const auto bytes_per_row =
+      static_cast<std::uint32_t>(frame_bytes_ / static_cast<std::size_t>(rows_));
+  p.bytesperline = bytes_per_row;
   p.sizeimage = static_cast<std::uint32_t>(frame_bytes_);
   const std::string asked = fourcc(wanted) + " " + std::to_string(width_px_) + " x " +
                             std::to_string(rows_) + ", " + std::to_string(frame_bytes_) + " bytes";
   if (ask(file_, VIDIOC_S_FMT, &format) != 0)
     fail(node_ + " refuses " + asked + because() +
          (errno == EBUSY ? "; a reader holds another format: close it first" : ""));
+  // A driver may want more room than a frame takes (v4l2loopback: whole pages), but rows as they
+  // are.
   if (p.pixelformat != wanted || p.width != static_cast<std::uint32_t>(width_px_) ||
-      p.height != static_cast<std::uint32_t>(rows_) || p.sizeimage != frame_bytes_) {
+      p.height != static_cast<std::uint32_t>(rows_) || p.bytesperline != bytes_per_row ||
+      p.sizeimage < frame_bytes_) {
     fail(node_ + ": asked for " + asked + ", got " + fourcc(p.pixelformat) + " " +
          std::to_string(p.width) + " x " + std::to_string(p.height) + ", " +
-         std::to_string(p.sizeimage) +
-         " bytes; a reader holds that format (close it first), or the node cannot do this one");
+         std::to_string(p.sizeimage) + " bytes in rows of " + std::to_string(p.bytesperline) +
+         "; a reader holds that format (close it first), or the node cannot do this one");
   }
   auto interval = zeroed<v4l2_streamparm>();
   interval.type = V4L2_BUF_TYPE_VIDEO_OUTPUT;

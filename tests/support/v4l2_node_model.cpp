@@ -157,6 +157,8 @@ int V4l2NodeModel::Self::set_format(v4l2_format& f) {
   const std::uint32_t bytes = fourcc == V4L2_PIX_FMT_GREY ? 1 : fourcc == V4L2_PIX_FMT_Y16 ? 2 : 4;
   p.bytesperline = bytes * p.width;
   p.sizeimage = p.bytesperline * p.height;
+  // The loopback's buffers are whole pages, and it says so.
+  if (spec.loopback) p.sizeimage = (p.sizeimage + 4095) / 4096 * 4096;
   size = p.sizeimage;
   return 0;
 }
