@@ -21,6 +21,7 @@ using engine::Status;
 using std::chrono::milliseconds;
 
 constexpr milliseconds kLookAgain{100};
+constexpr unsigned kLooksToRenew = 3;
 
 Duration now() noexcept { return hil::SteadyClock::stopwatch(); }
 
@@ -90,10 +91,12 @@ UsbCounts UsbLink::counts() const {
 /// Serves libusb, and puts the device back when it is gone.
 void UsbLink::keep(const std::stop_token& stop) noexcept {
   UsbPort& d = *device_;
+  unsigned looks = 0;
   while (!stop.stop_requested()) {
     if (!d.connected) {
       const std::lock_guard use(d.in_use);
       d.close();
+      if (++looks % kLooksToRenew == 0) d.renew();
       try {
         static_cast<void>(d.try_open(spec_, width_px_, rows_, bits_));
       } catch (const std::exception&) {  // no memory: as if nothing were there

@@ -164,13 +164,22 @@ void UsbPort::close() noexcept {
       handle = nullptr;
       out.clear();
       in.fill(nullptr);
+      lost_transfers = true;
       return;
     }
     handle_events(kUsbLook);
   }
+  free_transfers();  // libusb asks them for their handle then
   static_cast<void>(libusb_release_interface(handle, place.interface));
   libusb_close(handle);
   handle = nullptr;
+}
+
+void UsbPort::renew() noexcept {
+  libusb_context* fresh = nullptr;
+  if (lost_transfers || libusb_init(&fresh) != 0) return;
+  libusb_exit(context);
+  context = fresh;
 }
 
 void UsbPort::handle_events(milliseconds timeout) noexcept {

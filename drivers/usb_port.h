@@ -58,6 +58,9 @@ struct UsbPort {
   /// Empty, or why a device that is there cannot be used. Thread: the keeper, or before it.
   [[nodiscard]] std::string try_open(const UsbSpec& spec, int width_px, int rows, int bits);
   void close() noexcept;
+  /// Starts libusb anew. What it knows of the bus it has from udev, and where nobody runs that, as
+  /// in a container, it sees only what was there at its start. Pre: closed.
+  void renew() noexcept;
   void submit_idle_in() noexcept;
   void out_ended(libusb_transfer* t) noexcept;
   void in_ended(libusb_transfer* t) noexcept;
@@ -68,6 +71,7 @@ struct UsbPort {
   PacketQueue& packets;
   libusb_context* context = nullptr;
   libusb_device_handle* handle = nullptr;
+  bool lost_transfers = false;  // libusb still has some that never ended
   UsbPlace place;
   UsbLimits limits;
   PixelFormat format = PixelFormat::kPlain16;
