@@ -29,6 +29,8 @@ hil::LoopSpec loop_spec(const Scenario& scenario, engine::SimTime start, Duratio
   spec.width_px = scenario.scene.camera.width_px;
   spec.height_px = scenario.scene.camera.height_px;
   spec.bits = scenario.detector.bits;
+  // A slow cable may take all of the time that there is.
+  spec.send_timeout = std::max(spec.send_timeout, run.period);
   if (run.clock != ClockMode::kRealtime) {
     spec.when_busy = hil::WhenBusy::kWait;
     spec.send_timeout = run.answer_timeout;
