@@ -31,24 +31,12 @@ constexpr std::uint32_t kToHost = 1;
 constexpr std::uint32_t kZeroPacket = 0x40;
 // More than any transfer of a frame: who says more is none of ours.
 constexpr std::uint32_t kLargestTransfer = 64U << 20;
+// More than any host has in flight.
+constexpr std::size_t kMostWaiting = 1024;
 
-constexpr std::uint8_t kOut = 1;
-constexpr std::uint8_t kIn = 2;
-constexpr std::size_t kPacket = 512;
-constexpr std::uint16_t kVendor = 0x1209;
-constexpr std::uint16_t kProduct = 0x0001;
 constexpr std::uint32_t kHighSpeed = 3;
 
-template <class T>
-void append(std::vector<std::byte>& out, T value) {
-  for (std::size_t i = sizeof value; i-- > 0;)
-    out.push_back(static_cast<std::byte>(value >> (8 * i) & 0xFF));
-}
-
-void append_text(std::vector<std::byte>& out, std::string_view text, std::size_t bytes) {
-  for (std::size_t i = 0; i < bytes; ++i)
-    out.push_back(i < text.size() ? static_cast<std::byte>(text[i]) : std::byte{0});
-}
+using Header = std::array<std::byte, kCommandBytes>;
 
 template <class T>
 T number(std::span<const std::byte> in, std::size_t at) noexcept {
@@ -58,24 +46,21 @@ std::uint32_t word(std::span<const std::byte> in, std::size_t at) noexcept {
   return number<std::uint32_t>(in, at);
 }
 
-std::vector<std::byte> bytes_of(std::initializer_list<unsigned> values) {
-  std::vector<std::byte> out;
-  for (const unsigned v : values) out.push_back(static_cast<std::byte>(v));
-  return out;
-}
-
-std::vector<std::byte> string_descriptor(std::string_view text) {
-  std::vector<std::byte> out = bytes_of({static_cast<unsigned>(2 + 2 * text.size()), 3});
-  for (const char c : text) {
-    out.push_back(static_cast<std::byte>(c));
-    out.push_back(std::byte{0});
-  }
-  return out;
+UsbSetup setup_of(std::span<const std::byte> in) noexcept {
+  const auto half = [in](std::size_t i) {
+    return static_cast<std::uint16_t>(std::to_integer<unsigned>(in[i]) |
+                                      std::to_integer<unsigned>(in[i + 1]) << 8);
+  };
+  return {std::to_integer<std::uint8_t>(in[0]), std::to_integer<std::uint8_t>(in[1]), half(2),
+          half(4), half(6)};
 }
 
 }  // namespace
 
-UsbIpDevice::UsbIpDevice(const UsbLimits& limits) : intake_(limits) {}
+UsbIpDevice::UsbIpDevice(UsbFunction& function)
+    : function_(function), parts_(usb_parts(function.descriptors())) {
+  function_.reset();
+}
 
 bool UsbIpDevice::take(std::span<const std::byte> bytes) {
   held_.insert(held_.end(), bytes.begin(), bytes.end());
@@ -99,32 +84,38 @@ bool UsbIpDevice::take_operation() {
   if (held_.size() < bytes) return true;
   const bool known =
       !imports || std::memcmp(held_.data() + kOperationBytes, kBusId, sizeof kBusId) == 0;
-  append(replies_, kVersion);
-  append(replies_, static_cast<std::uint16_t>(code & kReply));
-  append(replies_, std::uint32_t{known ? 0U : 1U});
-  if (!imports) append(replies_, std::uint32_t{1});  // devices
-  if (known) describe(replies_);
+  std::array<std::byte, kOperationBytes + 4> header{};
+  hil::BigEndianWriter out(header);
+  out.put(kVersion).put(static_cast<std::uint16_t>(code & kReply)).put(known ? 0U : 1U);
+  if (!imports) out.put(std::uint32_t{1});  // devices
+  reply(std::span(header).first(out.used()));
+  if (known) describe();
   if (!imports) {
-    for (const unsigned b :
-         {unsigned{kUsbClass}, unsigned{kUsbSubclass}, unsigned{kUsbProtocol}, 0U})
-      replies_.push_back(static_cast<std::byte>(b));
+    for (const UsbInterface& i : parts_.interfaces)
+      for (const unsigned b :
+           {unsigned{i.device_class}, unsigned{i.subclass}, unsigned{i.protocol}, 0U})
+        replies_.push_back(static_cast<std::byte>(b));
   }
   attached_ = imports && known;
   held_.erase(held_.begin(), held_.begin() + static_cast<std::ptrdiff_t>(bytes));
   return true;
 }
 
-void UsbIpDevice::describe(std::vector<std::byte>& out) const {
-  append_text(out, "/sys/devices/starloop/usb1/1-1", kPathBytes);
-  append_text(out, kBusId, kBusIdBytes);
-  append(out, std::uint32_t{1});  // bus
-  append(out, std::uint32_t{2});  // device
-  append(out, kHighSpeed);
-  append(out, kVendor);
-  append(out, kProduct);
-  append(out, std::uint16_t{0x0100});
-  // class, subclass, protocol of the device; configuration in use, configurations, interfaces
-  for (const unsigned b : {0U, 0U, 0U, 1U, 1U, 1U}) out.push_back(static_cast<std::byte>(b));
+void UsbIpDevice::describe() {
+  constexpr std::string_view kPath = "/sys/devices/starloop/usb1/1-1";
+  const std::vector<std::byte>& device = function_.descriptors().device;
+  std::array<std::byte, kPathBytes + kBusIdBytes + 24> out{};
+  std::memcpy(out.data(), kPath.data(), kPath.size());
+  std::memcpy(out.data() + kPathBytes, kBusId, sizeof kBusId);
+  hil::BigEndianWriter numbers(out, kPathBytes + kBusIdBytes);
+  numbers.put(std::uint32_t{1}).put(std::uint32_t{2}).put(kHighSpeed);  // bus, device, speed
+  for (const std::size_t at : {8U, 10U, 12U})  // vendor, product, release: little-endian there
+    numbers.put(device[at + 1]).put(device[at]);
+  for (const std::size_t at : {4U, 5U, 6U}) numbers.put(device[at]);  // class and so on
+  // Configuration in use, configurations, interfaces.
+  numbers.put(std::uint8_t{1}).put(std::uint8_t{1});
+  numbers.put(static_cast<std::uint8_t>(parts_.interfaces.size()));
+  reply(out);
 }
 
 bool UsbIpDevice::take_command() {
@@ -146,36 +137,48 @@ bool UsbIpDevice::take_command() {
   return true;
 }
 
+bool UsbIpDevice::has_endpoint(unsigned address) const noexcept {
+  return std::find(parts_.endpoints.begin(), parts_.endpoints.end(), address) !=
+         parts_.endpoints.end();
+}
+
 void UsbIpDevice::submit(std::span<const std::byte> header, std::span<const std::byte> data) {
   const std::uint32_t id = word(header, 4);
   const bool to_host = word(header, 12) == kToHost;
   const std::uint32_t endpoint = word(header, 16);
-  const std::uint32_t length = word(header, 24);
   if (endpoint == 0) {
-    control(id, header.subspan(40, 8), data);
-  } else if (endpoint == kOut && !to_host) {
+    control(id, setup_of(header.subspan(40, 8)), data);
+  } else if (endpoint > 15 || !has_endpoint(endpoint | (to_host ? kUsbToHost : 0))) {
+    end(id, -EPIPE, 0);
+  } else if (!to_host) {
     const bool ends =
-        data.size() % kPacket != 0 || data.empty() || (word(header, 20) & kZeroPacket) != 0;
-    intake_.take(data, ends);
-    end(id, 0, data.size(), {});
-  } else if (endpoint == kIn && to_host) {
-    waiting_.push_back({id, length});
+        data.size() % kUsbPacketBytes != 0 || data.empty() || (word(header, 20) & kZeroPacket) != 0;
+    function_.take(endpoint, data, ends);
+    end(id, 0, data.size());
+  } else if (waiting_.size() == kMostWaiting) {
+    end(id, -ENOMEM, 0);
   } else {
-    end(id, -EPIPE, 0, {});
+    waiting_.push_back({id, endpoint, word(header, 24)});
   }
 }
 
 void UsbIpDevice::serve() {
-  std::array<std::byte, kLargestUsbMessage> message{};
-  while (!waiting_.empty()) {
-    const std::size_t n = intake_.next_message(message);
-    if (n == 0) return;
-    const Request request = waiting_.front();
-    waiting_.pop_front();
-    if (n > request.bytes) {
-      end(request.id, -EOVERFLOW, 0, {});
+  std::uint32_t silent = 0;  // endpoints with nothing to say, a bit each
+  for (auto request = waiting_.begin(); request != waiting_.end();) {
+    const std::uint32_t bit = 1U << request->endpoint;
+    std::optional<UsbAnswer> answer;
+    if ((silent & bit) == 0) answer = function_.give(request->endpoint, request->bytes);
+    if (!answer) {
+      silent |= bit;
+      ++request;
+      continue;
+    }
+    const std::uint32_t id = request->id;
+    request = waiting_.erase(request);
+    if (answer->overflow) {
+      end(id, -EOVERFLOW, 0);
     } else {
-      end(request.id, 0, n, std::span(message).first(n));
+      end(id, 0, answer->head.size() + answer->data.size(), *answer);
     }
   }
 }
@@ -186,142 +189,76 @@ void UsbIpDevice::unlink(std::uint32_t id, std::uint32_t which) {
   // Of what has ended already the answer is on its way, and zero says so.
   const int status = it != waiting_.end() ? -ECONNRESET : 0;
   if (it != waiting_.end()) waiting_.erase(it);
-  append(replies_, kUnlinked);
-  append(replies_, id);
-  for (int i = 0; i < 3; ++i) append(replies_, std::uint32_t{0});
-  append(replies_, static_cast<std::uint32_t>(status));
-  replies_.resize(replies_.size() + kCommandBytes - 24);
+  Header header{};
+  hil::BigEndianWriter(header).put(kUnlinked).put(id);
+  hil::BigEndianWriter(header, 20).put(status);
+  reply(header);
 }
 
-void UsbIpDevice::end(std::uint32_t id, int status, std::size_t bytes,
-                      std::span<const std::byte> data) {
-  append(replies_, kSubmitted);
-  append(replies_, id);
-  for (int i = 0; i < 3; ++i) append(replies_, std::uint32_t{0});
-  append(replies_, static_cast<std::uint32_t>(status));
-  append(replies_, static_cast<std::uint32_t>(bytes));
-  replies_.resize(replies_.size() + kCommandBytes - 28);
-  replies_.insert(replies_.end(), data.begin(), data.end());
+void UsbIpDevice::end(std::uint32_t id, int status, std::size_t bytes, const UsbAnswer& answer) {
+  Header header{};
+  hil::BigEndianWriter(header).put(kSubmitted).put(id);
+  hil::BigEndianWriter(header, 20).put(status).put(static_cast<std::uint32_t>(bytes));
+  reply(header);
+  reply(answer.head);
+  reply(answer.data);
+}
+
+void UsbIpDevice::reply(std::span<const std::byte> bytes) {
+  replies_.insert(replies_.end(), bytes.begin(), bytes.end());
 }
 
 std::vector<std::byte> UsbIpDevice::replies() { return std::exchange(replies_, {}); }
 
-/// Empty: there is no such descriptor.
-std::vector<std::byte> UsbIpDevice::descriptor(unsigned type, unsigned index) const {
-  constexpr unsigned kDevice = 1;
-  constexpr unsigned kConfiguration = 2;
-  constexpr unsigned kString = 3;
-  if (type == kDevice)
-    return bytes_of({18, 1, 0x00, 0x02, 0, 0, 0, 64, kVendor & 0xFF, kVendor >> 8, kProduct & 0xFF,
-                     kProduct >> 8, 0x00, 0x01, 1, 2, 3, 1});
-  if (type == kConfiguration)
-    return bytes_of({9,
-                     2,
-                     32,
-                     0,
-                     1,
-                     1,
-                     0,
-                     0xC0,
-                     0,  //
-                     9,
-                     4,
-                     0,
-                     0,
-                     2,
-                     kUsbClass,
-                     kUsbSubclass,
-                     kUsbProtocol,
-                     0,  //
-                     7,
-                     5,
-                     kOut,
-                     2,
-                     kPacket & 0xFF,
-                     kPacket >> 8,
-                     0,  //
-                     7,
-                     5,
-                     0x80U | kIn,
-                     2,
-                     kPacket & 0xFF,
-                     kPacket >> 8,
-                     0});
-  if (type != kString) return {};
-  switch (index) {
-    case 0:
-      return bytes_of({4, 3, 0x09, 0x04});  // English
-    case 1:
-      return string_descriptor("Starloop");
-    case 2:
-      return string_descriptor("Frame injection device");
-    case 3:
-      return string_descriptor("1");
+bool UsbIpDevice::standard(const UsbSetup& setup, std::vector<std::byte>& answer) {
+  const auto bytes = [&answer](std::initializer_list<unsigned> values) {
+    for (const unsigned v : values) answer.push_back(static_cast<std::byte>(v));
+    return true;
+  };
+  const bool of_interface = setup.index < parts_.interfaces.size();
+  switch (unsigned{setup.type} << 8 | setup.request) {
+    case 0x8006:  // get descriptor
+      answer = usb_descriptor(function_.descriptors(), setup.value >> 8, setup.value & 0xFF);
+      return !answer.empty();
+    case 0x8008:  // get configuration
+      return bytes({1});
+    case 0x810A:  // get interface
+      return of_interface && bytes({0});
+    case 0x8000:  // get status: self-powered
+      return bytes({1, 0});
+    case 0x8100:
+    case 0x8200:
+      return bytes({0, 0});
+    case 0x0009:  // set configuration
+      return setup.value <= 1;
+    case 0x010B:  // set interface
+      return of_interface && setup.value == 0;
+    case 0x0201:  // clear a halt
+      if (setup.value != 0 || !has_endpoint(setup.index)) return false;
+      function_.clear_halt(setup.index);
+      return true;
     default:
-      return {};
+      return false;
   }
 }
 
-void UsbIpDevice::control(std::uint32_t id, std::span<const std::byte> setup,
+void UsbIpDevice::control(std::uint32_t id, const UsbSetup& setup,
                           std::span<const std::byte> data) {
-  const auto at = [&](std::size_t i) { return std::to_integer<unsigned>(setup[i]); };
-  const unsigned type = at(0);
-  const unsigned request = at(1);
-  const std::size_t length = at(6) | at(7) << 8;
-  std::array<std::byte, kLargestUsbMessage> message{};
-  std::vector<std::byte> answer;
-  bool known = true;
-  switch (type << 8 | request) {
-    case 0x8006:  // get descriptor
-      answer = descriptor(at(3), at(2));
-      known = !answer.empty();
-      break;
-    case 0x8008:  // get configuration
-      answer = bytes_of({1});
-      break;
-    case 0x810A:  // get interface
-      answer = bytes_of({0});
-      break;
-    case 0x8000:  // get status: self-powered
-      answer = bytes_of({1, 0});
-      break;
-    case 0x8100:
-    case 0x8200:
-      answer = bytes_of({0, 0});
-      break;
-    case 0x0009:  // set configuration
-    case 0x010B:  // set interface
-    case 0x0201:  // clear a halt
-      break;
-    case 0xC100U | static_cast<unsigned>(UsbRequest::kLimits): {
-      const auto limits = encode_limits(intake_.limits());
-      answer.assign(limits.begin(), limits.end());
-      break;
-    }
-    case 0xC100U | static_cast<unsigned>(UsbRequest::kStatus): {
-      const std::size_t n = intake_.status_message(message);
-      answer.assign(message.begin(), message.begin() + static_cast<std::ptrdiff_t>(n));
-      break;
-    }
-    case 0x4100U | static_cast<unsigned>(UsbRequest::kReset): {
-      std::uint32_t session = 0;
-      known = data.size() == sizeof session;
-      if (known) {
-        std::memcpy(&session, data.data(), sizeof session);
-        intake_.reset(session);
-      }
-      break;
-    }
-    default:
-      known = false;
+  constexpr unsigned kKind = 0x60;  // bits of a request's type: zero is standard
+  std::optional<std::vector<std::byte>> answer;
+  if ((setup.type & kKind) != 0) {
+    answer = function_.control(setup, data);
+  } else if (std::vector<std::byte> some; standard(setup, some)) {
+    answer = std::move(some);
   }
-  if (!known) {
-    end(id, -EPIPE, 0, {});
+  if (!answer) {
+    end(id, -EPIPE, 0);
     return;
   }
-  if (answer.size() > length) answer.resize(length);
-  const bool to_host = (type & 0x80U) != 0;
-  end(id, 0, to_host ? answer.size() : data.size(), answer);
+  const bool to_host = (setup.type & kUsbToHost) != 0;
+  if (!to_host) answer->clear();
+  if (answer->size() > setup.length) answer->resize(setup.length);
+  end(id, 0, to_host ? answer->size() : data.size(), {.data = *answer});
 }
 
 }  // namespace drivers

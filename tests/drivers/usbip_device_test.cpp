@@ -9,6 +9,7 @@
 
 #include <gtest/gtest.h>
 
+#include "drivers/usb_device/injection_device.h"
 #include "engine/core/random.h"
 #include "hil/big_endian.h"
 #include "tests/support/usb_frames.h"
@@ -16,6 +17,7 @@
 
 namespace {
 
+using drivers::InjectionDevice;
 using drivers::UsbIpDevice;
 using drivers::UsbMessage;
 using usbip_host::Bytes;
@@ -68,7 +70,8 @@ class UsbIp : public testing::Test {
     ASSERT_TRUE(device_.attached());
     static_cast<void>(device_.replies());
   }
-  UsbIpDevice device_{usb_frames::limits()};
+  InjectionDevice function_{usb_frames::limits()};
+  UsbIpDevice device_{function_};
 };
 
 Bytes frame_bytes(std::uint64_t sequence) {
@@ -153,14 +156,14 @@ TEST_F(UsbIp, FramesComeWholeInOneOrSeveralTransfersAndCreditsGoBack) {
     const std::size_t cut = k % 2 == 0 ? 1024 : 2048;
     ASSERT_TRUE(device_.take(
         submit(100 + k, kOut, 1, 0, static_cast<std::uint32_t>(cut), {}, all.first(cut))));
-    EXPECT_FALSE(device_.intake().front().has_value());
+    EXPECT_FALSE(function_.intake().front().has_value());
     ASSERT_TRUE(
         device_.take(submit(200 + k, kOut, 1, kZeroPacket,
                             static_cast<std::uint32_t>(bytes.size() - cut), {}, all.subspan(cut))));
-    const auto frame = device_.intake().front();
+    const auto frame = function_.intake().front();
     ASSERT_TRUE(frame.has_value()) << k;
     EXPECT_TRUE(usb_frames::shows(*frame, k));
-    device_.intake().pop();
+    function_.intake().pop();
     ASSERT_TRUE(device_.take(submit(300 + k, kIn, 2, 0, 1024)));
   }
   const auto r = replies_of(device_, {2, 310, 311, 312, 313, 314, 315});
@@ -176,7 +179,7 @@ TEST_F(UsbIp, CommandsAnswerTheTransfersThatWait) {
   for (std::uint32_t n = 1; n <= 3; ++n) ASSERT_TRUE(device_.take(submit(n, kIn, 2, 0, 1024)));
   static_cast<void>(device_.replies());
   const Bytes packet(40, std::byte{7});
-  ASSERT_TRUE(device_.intake().command(packet));
+  ASSERT_TRUE(function_.intake().command(packet));
   device_.serve();
   const auto r = replies_of(device_, {2});
   ASSERT_EQ(r.size(), 1U);
@@ -197,7 +200,7 @@ TEST_F(UsbIp, ATransferThatIsTakenBackIsTakenBackOnce) {
   EXPECT_EQ(r[0].status, -ECONNRESET);
   EXPECT_EQ(r[1].status, 0);
   const Bytes packet(40, std::byte{7});
-  ASSERT_TRUE(device_.intake().command(packet));
+  ASSERT_TRUE(function_.intake().command(packet));
   device_.serve();
   EXPECT_TRUE(device_.replies().empty()) << "nobody waits any more";
 }
@@ -219,7 +222,8 @@ TEST_F(UsbIp, BytesInAnyPiecesAreTheSame) {
   ASSERT_TRUE(device_.take(all));
   const Bytes expected = device_.replies();
   for (const std::size_t piece : {1U, 7U, 47U, 48U, 49U, 1000U}) {
-    UsbIpDevice other(usb_frames::limits());
+    InjectionDevice function(usb_frames::limits());
+    UsbIpDevice other(function);
     Bytes seen;
     for (std::size_t at = 0; at < all.size(); at += piece) {
       ASSERT_TRUE(other.take(std::span(all).subspan(at, std::min(piece, all.size() - at))));
@@ -232,15 +236,15 @@ TEST_F(UsbIp, BytesInAnyPiecesAreTheSame) {
 
 TEST_F(UsbIp, WhatIsNotTheProtocolEndsTheConnection) {
   EXPECT_FALSE(device_.take(Words().half(0x0106).half(0x8003).word(0).bytes()));
-  UsbIpDevice other(usb_frames::limits());
+  UsbIpDevice other(function_);
   EXPECT_FALSE(other.take(Words().half(0x0111).half(0x8004).word(0).bytes()));
-  UsbIpDevice third(usb_frames::limits());
+  UsbIpDevice third(function_);
   ASSERT_TRUE(third.take(import_request("1-1")));
   EXPECT_FALSE(third.take(submit(1, kOut, 1, 0, 0x7FFFFFFF)));
   // Random bytes: whatever they do, they do not crash.
   engine::Draws draws(9, engine::Stream::kLight, 0, 3);
   for (int i = 0; i < 3000; ++i) {
-    UsbIpDevice victim(usb_frames::limits());
+    UsbIpDevice victim(function_);
     if (i % 2 == 0) {
       ASSERT_TRUE(victim.take(import_request("1-1")));
     }

@@ -1,12 +1,16 @@
-// The device's side of the USB stream, without the board: a frame-injection device that a kernel
-// attaches over USB/IP. Its frames come out of shared memory, as from `starloop run` itself, and
-// commands go back.
+// A USB device in software, which a kernel attaches over USB/IP: a frame-injection device, whose
+// frames come out of shared memory as from `starloop run` itself,
 //
 //   starloop_usb_device --shm cam0                        (on the on-board computer, or anywhere)
 //   sudo modprobe vhci-hcd; sudo usbip attach -r HOST -b 1-1       (where starloop runs)
 //   starloop run config/flyby.toml --set link.to=usb
+//
+// or a standard camera, whose frames are those of `starloop run`:
+//
+//   starloop run config/flyby.toml --set link.to=shm:cam0 &
+//   starloop_usb_device --camera cam0                              (where starloop runs)
+//   sudo modprobe vhci-hcd; sudo usbip attach -r HOST -b 1-1       (on the on-board computer)
 
-#include <array>
 #include <cstdio>
 #include <cstring>
 #include <exception>
@@ -14,24 +18,26 @@
 #include <thread>
 
 #include <CLI/CLI.hpp>
-#include <asio.hpp>
 
 #include "drivers/pixel_packing.h"
 #include "drivers/shm_link.h"
-#include "drivers/usb_device/usbip_device.h"
+#include "drivers/usb_device/injection_device.h"
 #include "hil/space_packet.h"
 #include "hil/telemetry_packet.h"
+#include "tools/usb_device/camera_source.h"
+#include "tools/usb_device/usbip_server.h"
 
 namespace {
 
-using asio::ip::tcp;
 using engine::Duration;
+using usb_device::UsbIpServer;
 
 constexpr Duration kPatience{50'000'000};
 
 struct Options {
   std::string address = "127.0.0.1";
   std::uint16_t port = 3240;
+  std::string camera;
   std::string shm = "starloop-usb";
   int width_px = 1024;
   int height_px = 1024;
@@ -67,70 +73,15 @@ void take_news(std::span<const std::byte> news, hil::Frame& frame) {
   }
 }
 
-/// Serves one host after the other, and hands over what comes.
-class Server {
+/// Frames of an injection device into shared memory, and commands of their reader back.
+class HandOver {
  public:
-  explicit Server(const Options& o)
-      : limits_(limits_of(o)),
-        shm_({.name = o.shm, .slots = o.frames + 1}, o.width_px, o.height_px),
-        pixels_(static_cast<std::size_t>(o.width_px) * static_cast<std::size_t>(o.height_px + 1)),
-        acceptor_(io_, tcp::endpoint(asio::ip::make_address(o.address), o.port)),
-        socket_(io_) {
-    accept();
-    commands_ = std::jthread([this](const std::stop_token& stop) { take_commands(stop); });
-  }
-  ~Server() { commands_ = {}; }
-  Server(const Server&) = delete;
-  Server& operator=(const Server&) = delete;
+  explicit HandOver(const Options& o)
+      : shm_({.name = o.shm, .slots = o.frames + 1}, o.width_px, o.height_px),
+        pixels_(static_cast<std::size_t>(o.width_px) * static_cast<std::size_t>(o.height_px + 1)) {}
 
-  void run() { io_.run(); }
-  [[nodiscard]] unsigned port() const { return acceptor_.local_endpoint().port(); }
-
- private:
-  void accept() {
-    device_ = std::make_unique<drivers::UsbIpDevice>(limits_);
-    acceptor_.async_accept(socket_, [this](const asio::error_code& error) {
-      if (error) {
-        accept();
-        return;
-      }
-      socket_.set_option(tcp::no_delay(true));
-      read();
-    });
-  }
-
-  void read() {
-    socket_.async_read_some(
-        asio::buffer(in_), [this](const asio::error_code& error, std::size_t n) {
-          const bool good = !error && device_->take(std::as_bytes(std::span(in_).first(n)));
-          if (!good) {
-            std::printf("host gone: %llu frames, %llu of them nobody took in time\n",
-                        static_cast<unsigned long long>(frames_),
-                        static_cast<unsigned long long>(not_taken_));
-            std::fflush(stdout);
-            socket_.close();
-            accept();
-            return;
-          }
-          hand_over();
-          device_->serve();
-          if (write()) read();
-        });
-  }
-
-  /// A host takes what it asked for: it may be waited for.
-  bool write() {
-    const std::vector<std::byte> out = device_->replies();
-    asio::error_code error;
-    if (!out.empty()) asio::write(socket_, asio::buffer(out.data(), out.size()), error);
-    if (!error) return true;
-    socket_.close();
-    accept();
-    return false;
-  }
-
-  void hand_over() {
-    for (auto f = device_->intake().front(); f; f = device_->intake().front()) {
+  void take_frames(drivers::FrameIntake& intake) {
+    for (auto f = intake.front(); f; f = intake.front()) {
       const drivers::UsbFrameHeader& h = f->header;
       const auto width = static_cast<std::size_t>(h.width_px);
       const std::size_t image = width * static_cast<std::size_t>(h.height_px);
@@ -154,70 +105,118 @@ class Server {
       take_news(f->payload.subspan(bytes), frame);
       ++frames_;
       if (!shm_.send(frame, Duration{}).ok()) ++not_taken_;
-      device_->intake().pop();
+      intake.pop();
     }
   }
 
-  void take_commands(const std::stop_token& stop) {
-    while (!stop.stop_requested()) {
-      const auto command = shm_.receive(kPatience);
-      if (!command.ok()) {
-        if (command.error().fault == engine::Fault::kDisconnected)
+  /// A thread that gives each command to `take`.
+  template <class Take>
+  [[nodiscard]] std::jthread return_commands(Take take) {
+    return std::jthread([this, take](const std::stop_token& stop) {
+      while (!stop.stop_requested()) {
+        const auto command = shm_.receive(kPatience);
+        if (command.ok()) {
+          take(hil::encode_command(command.value()));
+        } else if (command.error().fault == engine::Fault::kDisconnected) {
           std::this_thread::sleep_for(kPatience);
-        continue;
+        }
       }
-      const hil::CommandPacket packet = hil::encode_command(command.value());
-      asio::post(io_, [this, packet] {
-        if (!device_->attached() || !device_->intake().command(packet.bytes())) return;
-        device_->serve();
-        static_cast<void>(write());
-      });
-    }
+    });
   }
 
-  drivers::UsbLimits limits_;
+  void report() const {
+    std::printf("host gone: %llu frames, %llu of them nobody took in time\n",
+                static_cast<unsigned long long>(frames_),
+                static_cast<unsigned long long>(not_taken_));
+    std::fflush(stdout);
+  }
+
+ private:
   drivers::ShmLink shm_;
   std::vector<std::uint16_t> pixels_;
   std::uint64_t frames_ = 0;
   std::uint64_t not_taken_ = 0;
-  asio::io_context io_;
-  tcp::acceptor acceptor_;
-  tcp::socket socket_;
-  std::unique_ptr<drivers::UsbIpDevice> device_;
-  std::array<char, 256 * 1024> in_{};
-  std::jthread commands_;  // the last member: it uses the others
 };
+
+void be_injection_device(const Options& o) {
+  HandOver hand_over(o);
+  drivers::InjectionDevice device(limits_of(o));
+  UsbIpServer server(o.address, o.port);
+  std::printf("listening on %s:%u, frames to shared memory %s\n", o.address.c_str(), server.port(),
+              o.shm.c_str());
+  std::fflush(stdout);
+  const std::jthread commands = hand_over.return_commands([&](const hil::CommandPacket& packet) {
+    server.post([&device, packet] { static_cast<void>(device.intake().command(packet.bytes())); });
+  });
+  server.run(device, {.heard = [&] { hand_over.take_frames(device.intake()); },
+                      .gone = [&] { hand_over.report(); }});
+}
+
+void report(const drivers::UvcCounts& c) {
+  std::printf(
+      "host gone: %llu frames sent, %llu overtaken, %llu cut, %llu while nobody streamed; %llu "
+      "commands, %llu lost; %llu requests stalled\n",
+      static_cast<unsigned long long>(c.sent), static_cast<unsigned long long>(c.overtaken),
+      static_cast<unsigned long long>(c.cut), static_cast<unsigned long long>(c.idle),
+      static_cast<unsigned long long>(c.commands), static_cast<unsigned long long>(c.commands_lost),
+      static_cast<unsigned long long>(c.stalled));
+  std::fflush(stdout);
+}
+
+[[noreturn]] void be_camera(const Options& o) {
+  UsbIpServer server(o.address, o.port);
+  for (;;) {
+    usb_device::CameraSource source(o.camera);
+    const drivers::UvcSpec spec = source.wait_for_camera();
+    drivers::UvcCamera camera(spec, [&](const hil::Command& c) { return source.send(c); });
+    std::printf("listening on %s:%u, a camera of %d x %d%s, %d bits, every %.3f ms\n",
+                o.address.c_str(), server.port(), spec.width_px, spec.height_px,
+                spec.rows_below > 0 ? " and a telemetry row" : "", spec.bits,
+                static_cast<double>(spec.period.count()) / 1e6);
+    std::fflush(stdout);
+    source.follow(
+        camera, [&](std::function<void()> work) { server.post(std::move(work)); },
+        [&] { server.stop(); });
+    server.run(camera, {.heard = {}, .gone = [&] { report(camera.counts()); }});
+    std::printf("the frames have changed: unplugged\n");
+    std::fflush(stdout);
+  }
+}
 
 }  // namespace
 
 int main(int argc, char** argv) {
   CLI::App app{
-      "A frame-injection device in software: a kernel attaches it over USB/IP (usbip attach -r "
-      "HOST\n"
-      "-b 1-1), its frames come out of shared memory, and commands of the software that reads "
-      "them\n"
-      "go back. USB/IP has no key: an address other than loopback is for a network of your own."};
+      "A USB device in software: a kernel attaches it over USB/IP (usbip attach -r HOST -b 1-1).\n"
+      "It injects frames: they come out of shared memory, and commands of the software that reads\n"
+      "them go back. With --camera it is a standard camera (USB Video Class) instead, and shows "
+      "the\n"
+      "frames of starloop run. USB/IP has no key: an address other than loopback is for a network\n"
+      "of your own."};
   Options o;
   app.add_option("--address", o.address, "to listen on")->capture_default_str();
   app.add_option("--port", o.port, "to listen on; 0: the system chooses")->capture_default_str();
+  CLI::Option* camera = app.add_option(
+      "--camera", o.camera, "be a camera with the frames of a run whose link.to is shm:NAME");
   app.add_option("--shm", o.shm, "name of the shared memory that gets the frames")
-      ->capture_default_str();
+      ->capture_default_str()
+      ->excludes(camera);
   app.add_option("--width", o.width_px, "largest frame")
       ->check(CLI::Range(1, 4096))
-      ->capture_default_str();
+      ->capture_default_str()
+      ->excludes(camera);
   app.add_option("--height", o.height_px, "largest frame, without a telemetry row")
       ->check(CLI::Range(1, 4096))
-      ->capture_default_str();
+      ->capture_default_str()
+      ->excludes(camera);
   app.add_option("--frames", o.frames, "that it has room for")
       ->check(CLI::Range(1, 15))
-      ->capture_default_str();
+      ->capture_default_str()
+      ->excludes(camera);
   CLI11_PARSE(app, argc, argv);
   try {
-    auto server = std::make_unique<Server>(o);
-    std::printf("listening on %s:%u, frames to shared memory %s\n", o.address.c_str(),
-                server->port(), o.shm.c_str());
-    std::fflush(stdout);
-    server->run();
+    if (!o.camera.empty()) be_camera(o);
+    be_injection_device(o);
   } catch (const std::exception& e) {
     std::fprintf(stderr, "starloop_usb_device: %s\n", e.what());
     return 3;
