@@ -1,0 +1,24 @@
+# Limit: 120 s
+# The kernel's own uvcvideo makes a camera of the device in software, and a client that we did not write reads every
+# format of it bit for bit.
+. "$source/tests/guest/uvc.sh"
+camera_by_network 4
+words="$(v4l2-ctl -d $uvc_node --all)"
+for line in 'Driver name *: uvcvideo' 'Card type *: Starloop camera' 'Width/Height *: 1024/1025' \
+            'pan_absolute.*min=-648000 max=648000 step=1' 'Frames per second: 4.000'; do
+  grep -q "$line" <<<"$words" || fail "no '$line' in $words"
+done
+formats="$(v4l2-ctl -d $uvc_node --list-formats | sed -n "s/.*: '\(.*\)'.*/\1/p" | paste -sd,)"
+[[ "$formats" == 'Y16 ,GREY,YUYV' ]] || fail "formats: $formats"
+grab() { v4l2-ctl -d $uvc_node --set-fmt-video=pixelformat="$1" --stream-mmap --stream-count="$2" --stream-to="$1.raw"; }
+# Twice: a stream that was stopped begins anew.
+for round in 1 2; do
+  grab 'Y16 ' 8
+  /usr/bin/python3 "$source/tools/check_pattern.py" --rows-below 1 <'Y16 .raw'
+done
+for format in GREY YUYV; do
+  grab $format 5
+  /usr/bin/python3 "$source/tests/guest/uvc_judge.py" $format 1 <$format.raw
+done
+no_camera_by_network
+cat device.out

@@ -1,0 +1,30 @@
+# What checks of the camera share; read after lib.sh.
+uvc_node=/dev/video0
+
+# A run of the pattern with so many frames a second, and its camera attached: the first free node.
+camera_by_network() {
+  pattern cam --set link.to=shm:cam0 --set run.frame_rate_hz="$1" --set realtime.priority=0
+  run_pid=$!
+  beside device "$build/starloop_usb_device" --camera cam0
+  device_pid=$!
+  within 60 grep -q listening device.out
+  usbip attach -r 127.0.0.1 -b 1-1
+  within 30 uvc_is_there
+}
+uvc_is_there() {
+  local name
+  for name in /sys/class/video4linux/video*; do
+    if grep -q '^Starloop camera' "$name/name" && [[ "$(cat "$name/index")" == 0 ]]; then
+      uvc_node="/dev/$(basename "$name")"
+      v4l2-ctl -d "$uvc_node" -D
+      return
+    fi
+  done
+  return 1
+}
+no_camera_by_network() {
+  usbip detach -p 0
+  within 10 grep -q 'host gone' device.out
+  kill -9 $device_pid
+  kill -INT $run_pid
+}
