@@ -1,9 +1,9 @@
 # What checks of the camera share; read after lib.sh.
 uvc_node=/dev/video0
 
-# A run of the pattern with so many frames a second, and its camera attached: the first free node.
+# Starts a run beside the check, with the words given, and attaches its camera.
 camera_by_network() {
-  pattern cam --set link.to=shm:cam0 --set run.frame_rate_hz="$1" --set realtime.priority=0
+  "$@"
   run_pid=$!
   beside device "$build/starloop_usb_device" --camera cam0
   device_pid=$!

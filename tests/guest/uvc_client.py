@@ -2,10 +2,10 @@
 """Software that knows a camera by V4L2 alone, and closes its loop over the extension unit of
 drivers/uvc_protocol.md:
 
-    uvc_client.py NODE FRAMES [--telemetry-row]
+    uvc_client.py NODE WIDTH FRAMES
 
-Reads frames of the pattern, asks the camera what it knows of each, answers each with a trim, and waits until the
-camera says that it has turned. Prints what it found; exit code 0: all of it was right.
+Reads frames in Y16 that have a telemetry row, asks the camera what it knows of each, answers each with a trim, and sees
+the camera turn. Prints what it found; exit code 0: all of it was right.
 """
 import ctypes
 import errno
@@ -104,7 +104,7 @@ def expect(what: str, got, wanted) -> None:
 
 def main() -> int:
     camera = Camera(sys.argv[1])
-    frames = int(sys.argv[2])
+    width, frames = int(sys.argv[2]), int(sys.argv[3])
     # What the driver asks of each control before it lets anybody use it.
     for selector, size in ((COMMAND, 72), (FRAME, 72), (SELECT, 8), (COUNTS, 128)):
         expect("length", struct.unpack("<H", camera.query(selector, GET_LEN, bytes(2)))[0], size)
@@ -114,20 +114,18 @@ def main() -> int:
     expect("news may not be set", camera.refused(FRAME, SET_CUR, bytes(72)) in (errno.EACCES, errno.EBADRQC), True)
 
     camera.start()
-    mode = 2**11
-    inverse = pow(7, -1, mode)
     matched = 0
     wanted = (20_000, -10_000)  # nanoradians
     seen = 0
     for n in range(frames):
         b = camera.buffer()
         fcntl.ioctl(camera.file, DQBUF, b)
-        pixel = struct.unpack_from("<H", camera.buffers[b.index], 0)[0]
-        shown = pixel * inverse % mode
+        row = camera.buffers[b.index][b.bytesused - 2 * width:b.bytesused:2]
+        expect("telemetry row", row[:4], b"SLTR")
         number = camera.counts()[12] + b.sequence
+        expect("the frame's number", number, int.from_bytes(row[8:16], "little"))
         news = camera.frame(number)
-        # The pattern names the frame modulo 2048.
-        expect("the frame that was asked for", (news[0], news[0] % mode), (number, shown))
+        expect("what is known of the frame", news[:2], (number, int.from_bytes(row[16:24], "little")))
         matched += 1
         camera.query(COMMAND, SET_CUR, command(n, number, news[1] + news[2], wanted))
         if abs(news[3] - wanted[0]) < 500 and abs(news[4] - wanted[1]) < 500:

@@ -5,60 +5,18 @@
 #include <string>
 #include <vector>
 
-#include <arpa/inet.h>
 #include <gtest/gtest.h>
-#include <netinet/in.h>
-#include <sys/socket.h>
 #include <unistd.h>
 
 #include "drivers/client/starloop_client.h"
-#include "hil/big_endian.h"
 #include "hil/space_packet.h"
 #include "tests/support/process.h"
 #include "tests/support/usb_frames.h"
-#include "tests/support/usbip_host.h"
+#include "tests/support/usbip_connection.h"
 
 namespace {
 
 using usbip_host::Bytes;
-
-/// A connection that waits as long as it takes.
-class Host {
- public:
-  explicit Host(int port) : socket_(socket(AF_INET, SOCK_STREAM, 0)) {
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_port = htons(static_cast<std::uint16_t>(port));
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    connected_ = connect(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
-  }
-  ~Host() { close(socket_); }
-  Host(const Host&) = delete;
-  Host& operator=(const Host&) = delete;
-
-  [[nodiscard]] bool connected() const { return connected_; }
-  void say(const Bytes& bytes) const {
-    ASSERT_EQ(send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL),
-              static_cast<ssize_t>(bytes.size()));
-  }
-  /// Exactly so many bytes; fewer at the end of the connection.
-  [[nodiscard]] Bytes hear(std::size_t count) const {
-    Bytes bytes(count);
-    const ssize_t n = recv(socket_, bytes.data(), count, MSG_WAITALL);
-    bytes.resize(n > 0 ? static_cast<std::size_t>(n) : 0);
-    return bytes;
-  }
-  /// The answer to a transfer, and its data.
-  [[nodiscard]] Bytes hear_answer(bool with_data) const {
-    const Bytes header = hear(48);
-    if (header.size() != 48 || !with_data) return {};
-    return hear(hil::BigEndianReader(header, 24).get<std::uint32_t>());
-  }
-
- private:
-  int socket_;
-  bool connected_ = false;
-};
 
 TEST(UsbDevice, FramesGoToTheClientAndItsCommandsToTheHost) {
   const std::string name = "starloop-usb-test-" + std::to_string(getpid());
@@ -71,7 +29,7 @@ TEST(UsbDevice, FramesGoToTheClientAndItsCommandsToTheHost) {
   ASSERT_EQ(starloop_open(&client, name.c_str(), 10'000), STARLOOP_OK) << starloop_last_error();
   // One host after the other; the first one leaves in the middle of a frame.
   for (std::uint32_t round = 1; round <= 3; ++round) {
-    const Host host(port);
+    const usbip_host::Connection host(port);
     ASSERT_TRUE(host.connected());
     host.say(usbip_host::import_request("1-1"));
     ASSERT_EQ(host.hear(320).size(), 320U);
@@ -126,11 +84,11 @@ TEST(UsbDevice, FramesGoToTheClientAndItsCommandsToTheHost) {
   }
   // What is no USB/IP closes the connection, and the next host is served.
   {
-    const Host stranger(port);
+    const usbip_host::Connection stranger(port);
     stranger.say(Bytes(64, std::byte{0x47}));
     EXPECT_TRUE(stranger.hear(1).empty());
   }
-  const Host next(port);
+  const usbip_host::Connection next(port);
   next.say(usbip_host::import_request("1-1"));
   EXPECT_EQ(next.hear(320).size(), 320U);
   starloop_close(client);

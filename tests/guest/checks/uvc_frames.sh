@@ -2,7 +2,8 @@
 # The kernel's own uvcvideo makes a camera of the device in software, and a client that we did not write reads every
 # format of it bit for bit.
 . "$source/tests/guest/uvc.sh"
-camera_by_network 4
+run_pattern() { pattern cam --set link.to=shm:cam0 --set run.frame_rate_hz="$1" --set realtime.priority=0; }
+camera_by_network run_pattern 4
 words="$(v4l2-ctl -d $uvc_node --all)"
 for line in 'Driver name *: uvcvideo' 'Card type *: Starloop camera' 'Width/Height *: 1024/1025' \
             'pan_absolute.*min=-648000 max=648000 step=1' 'Frames per second: 4.000'; do
