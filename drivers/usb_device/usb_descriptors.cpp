@@ -81,6 +81,7 @@ std::vector<std::byte> usb_descriptor(const UsbDescriptors& descriptors, unsigne
   constexpr unsigned kEnglish = 0x0409;
   if (type == kUsbDeviceDescriptor && index == 0) return descriptors.device;
   if (type == kUsbConfigurationDescriptor && index == 0) return descriptors.configuration;
+  if (type == kUsbCapabilitiesDescriptor && index == 0) return descriptors.capabilities;
   if (type != kUsbStringDescriptor || index > descriptors.strings.size()) return {};
   if (index > 0) return usb_string_descriptor(descriptors.strings[index - 1]);
   return DescriptorWriter().begin().bytes({kUsbStringDescriptor}).half(kEnglish).finish();

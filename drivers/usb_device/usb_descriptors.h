@@ -15,8 +15,12 @@ inline constexpr unsigned kUsbConfigurationDescriptor = 2;
 inline constexpr unsigned kUsbStringDescriptor = 3;
 inline constexpr unsigned kUsbInterfaceDescriptor = 4;
 inline constexpr unsigned kUsbEndpointDescriptor = 5;
-/// Of a bulk endpoint at high speed.
+inline constexpr unsigned kUsbCapabilitiesDescriptor = 15;
+inline constexpr unsigned kUsbCapabilityDescriptor = 16;
+inline constexpr unsigned kUsbCompanionDescriptor = 48;  // of an endpoint at SuperSpeed
+/// Of a bulk endpoint at high speed, and at SuperSpeed.
 inline constexpr std::size_t kUsbPacketBytes = 512;
+inline constexpr std::size_t kUsbSuperPacketBytes = 1024;
 /// Of the address of an endpoint to the host.
 inline constexpr unsigned kUsbToHost = 0x80;
 

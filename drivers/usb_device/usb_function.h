@@ -22,13 +22,14 @@ struct UsbSetup {
 struct UsbDescriptors {
   std::vector<std::byte> device;
   std::vector<std::byte> configuration;  ///< with all that is in it
+  std::vector<std::byte> capabilities;   ///< the binary object store; empty below SuperSpeed
   std::vector<std::string> strings;      ///< from number 1 on
 };
 
 /// What goes into one bulk IN transfer. The bytes are the function's, until its next call.
 struct UsbAnswer {
-  std::span<const std::byte> head;
-  std::span<const std::byte> data;
+  std::span<const std::byte> head{};
+  std::span<const std::byte> data{};
   bool overflow = false;  ///< more than there is room for: nothing went
 };
 

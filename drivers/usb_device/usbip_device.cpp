@@ -35,6 +35,7 @@ constexpr std::uint32_t kLargestTransfer = 64U << 20;
 constexpr std::size_t kMostWaiting = 1024;
 
 constexpr std::uint32_t kHighSpeed = 3;
+constexpr std::uint32_t kSuperSpeed = 5;
 
 using Header = std::array<std::byte, kCommandBytes>;
 
@@ -58,7 +59,9 @@ UsbSetup setup_of(std::span<const std::byte> in) noexcept {
 }  // namespace
 
 UsbIpDevice::UsbIpDevice(UsbFunction& function)
-    : function_(function), parts_(usb_parts(function.descriptors())) {
+    : function_(function),
+      parts_(usb_parts(function.descriptors())),
+      is_super_(!function.descriptors().capabilities.empty()) {
   function_.reset();
 }
 
@@ -108,7 +111,8 @@ void UsbIpDevice::describe() {
   std::memcpy(out.data(), kPath.data(), kPath.size());
   std::memcpy(out.data() + kPathBytes, kBusId, sizeof kBusId);
   hil::BigEndianWriter numbers(out, kPathBytes + kBusIdBytes);
-  numbers.put(std::uint32_t{1}).put(std::uint32_t{2}).put(kHighSpeed);  // bus, device, speed
+  // Bus, device, speed.
+  numbers.put(std::uint32_t{1}).put(std::uint32_t{2}).put(is_super_ ? kSuperSpeed : kHighSpeed);
   for (const std::size_t at : {8U, 10U, 12U})  // vendor, product, release: little-endian there
     numbers.put(device[at + 1]).put(device[at]);
   for (const std::size_t at : {4U, 5U, 6U}) numbers.put(device[at]);  // class and so on
@@ -151,8 +155,9 @@ void UsbIpDevice::submit(std::span<const std::byte> header, std::span<const std:
   } else if (endpoint > 15 || !has_endpoint(endpoint | (to_host ? kUsbToHost : 0))) {
     end(id, -EPIPE, 0);
   } else if (!to_host) {
+    const std::size_t packet = is_super_ ? kUsbSuperPacketBytes : kUsbPacketBytes;
     const bool ends =
-        data.size() % kUsbPacketBytes != 0 || data.empty() || (word(header, 20) & kZeroPacket) != 0;
+        data.size() % packet != 0 || data.empty() || (word(header, 20) & kZeroPacket) != 0;
     function_.take(endpoint, data, ends);
     end(id, 0, data.size());
   } else if (waiting_.size() == kMostWaiting) {

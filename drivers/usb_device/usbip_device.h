@@ -12,9 +12,9 @@
 namespace drivers {
 
 /// A device as the other end of USB/IP (protocol version 1.1.1, as Linux' own vhci-hcd speaks it):
-/// a host attaches it over a network or a socket pair, and its kernel sees a device at high speed
-/// that does what the function does. This class is the bytes alone; who carries them is the
-/// caller's business.
+/// a host attaches it over a network or a socket pair, and its kernel sees a device that does what
+/// the function does, at SuperSpeed if it has the descriptors for that, else at high speed. This
+/// class is the bytes alone; who carries them is the caller's business.
 ///
 /// Transfers are whole: USB/IP knows no packets, so what goes out ends where a transfer's length is
 /// no multiple of the packet size or its zero-packet flag is set.
@@ -55,6 +55,7 @@ class UsbIpDevice {
 
   UsbFunction& function_;
   UsbParts parts_;
+  bool is_super_;
   std::vector<std::byte> held_;  // of the host's, not yet whole
   std::vector<std::byte> replies_;
   std::deque<Request> waiting_;  // bulk IN

@@ -90,7 +90,26 @@ void add_stream_interface(DescriptorWriter& out, const UvcSpec& spec) {
   for (unsigned i = 0; i < kUvcFormats; ++i) out.bytes({0});  // nothing settable besides the format
   for (const Look& look : kLooks) add_format(out, spec, look);
   out.length_since(start, total);
-  out.begin().bytes({kUsbEndpointDescriptor, kAddress, kBulk}).half(kUsbPacketBytes).bytes({0});
+  const std::size_t packet = spec.super_speed ? kUsbSuperPacketBytes : kUsbPacketBytes;
+  out.begin().bytes({kUsbEndpointDescriptor, kAddress, kBulk});
+  out.half(static_cast<unsigned>(packet)).bytes({0});
+  if (spec.super_speed) out.begin().bytes({kUsbCompanionDescriptor, 0, 0, 0, 0});
+}
+
+/// What a device has to say of itself to be one of USB 3.
+std::vector<std::byte> capabilities() {
+  constexpr unsigned kUsb2Extension = 2;
+  constexpr unsigned kSuperSpeed = 3;
+  constexpr unsigned kOnlySuper = 1U << 3;
+  DescriptorWriter out;
+  out.begin().bytes({kUsbCapabilitiesDescriptor});
+  const std::size_t total = out.later();
+  out.bytes({2});
+  out.begin().bytes({kUsbCapabilityDescriptor, kUsb2Extension}).word(0);
+  out.begin().bytes({kUsbCapabilityDescriptor, kSuperSpeed, 0}).half(kOnlySuper);
+  out.bytes({3, 0}).half(0);  // works from that speed on; leaves sleep at once
+  out.length_since(0, total);
+  return out.finish();
 }
 
 }  // namespace
@@ -115,9 +134,13 @@ std::uint32_t uvc_interval(const UvcSpec& spec) noexcept {
 UsbDescriptors uvc_descriptors(const UvcSpec& spec) {
   UsbDescriptors d;
   // Class, subclass and protocol of a device whose interfaces belong together.
+  const unsigned version = spec.super_speed ? 0x0300 : 0x0200;
+  const unsigned control_packet = spec.super_speed ? 9 : 64;  // a power of two there
   d.device = DescriptorWriter()
                  .begin()
-                 .bytes({kUsbDeviceDescriptor, 0x00, 0x02, 0xEF, 0x02, 0x01, 64})
+                 .bytes({kUsbDeviceDescriptor})
+                 .half(version)
+                 .bytes({0xEF, 0x02, 0x01, control_packet})
                  .half(0x1209)
                  .half(0x0002)
                  .half(0x0100)
@@ -132,6 +155,7 @@ UsbDescriptors uvc_descriptors(const UvcSpec& spec) {
   add_stream_interface(c, spec);
   c.length_since(0, total);
   d.configuration = c.finish();
+  if (spec.super_speed) d.capabilities = capabilities();
   d.strings = {"Starloop", "Starloop camera", "1", "Starloop pointing"};
   return d;
 }

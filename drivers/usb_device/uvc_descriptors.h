@@ -16,9 +16,10 @@ struct UvcSpec {
   int rows_below = 0;    ///< telemetry rows, 0 or 1
   int bits = 11;         ///< of a pixel, in [1, 16]
   engine::Duration period{100'000'000};
+  bool super_speed = true;  ///< else high speed, for hosts that know no more
   /// Most of one payload, its header included. The default is the largest transfer of Linux' own
-  /// driver at high speed.
-  std::uint32_t payload_bytes = 16 * 1024;
+  /// driver at SuperSpeed.
+  std::uint32_t payload_bytes = 32 * 1024;
 };
 
 /// What a pixel becomes; the number is the format's in the descriptors.

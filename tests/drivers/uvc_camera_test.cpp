@@ -114,7 +114,7 @@ TEST_F(UvcCamera, AProbeIsAnsweredWithWhatThereIs) {
     EXPECT_EQ(answer->bmHint, 1);
     EXPECT_EQ(answer->dwFrameInterval, 1'000'000U);
     EXPECT_EQ(answer->dwMaxVideoFrameSize, w.frame_bytes);
-    EXPECT_EQ(answer->dwMaxPayloadTransferSize, 16384U);
+    EXPECT_EQ(answer->dwMaxPayloadTransferSize, 32768U);
     EXPECT_EQ(answer->dwClockFrequency, 1'000'000U);
   }
   // A host of UVC 1.0, and lengths that are nobody's.

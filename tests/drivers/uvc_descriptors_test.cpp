@@ -82,6 +82,35 @@ TEST(UvcDescriptors, LengthsAndNumbersFitTogether) {
   for (const std::size_t place : {14U, 15U, 16U}) EXPECT_LE(at(d.device, place), d.strings.size());
 }
 
+TEST(UvcDescriptors, SuperSpeedSaysSoAndHighSpeedDoesNot) {
+  drivers::UvcSpec spec = uvc_frames::spec();
+  const auto endpoint_of = [](const drivers::UsbDescriptors& d) {
+    const std::vector<Bytes> all = parts(d.configuration);
+    for (std::size_t i = 0; i < all.size(); ++i)
+      if (at(all[i], 1) == 5)
+        return std::vector<Bytes>(all.begin() + static_cast<std::ptrdiff_t>(i), all.end());
+    return std::vector<Bytes>{};
+  };
+  const drivers::UsbDescriptors super = drivers::uvc_descriptors(spec);
+  EXPECT_EQ(at(super.device, 3), 3U);
+  EXPECT_EQ(at(super.device, 7), 9U) << "2^9 bytes";
+  ASSERT_EQ(endpoint_of(super).size(), 2U) << "a companion";
+  EXPECT_EQ(at(endpoint_of(super)[0], 5), 1024U >> 8);
+  EXPECT_EQ(at(endpoint_of(super)[1], 1), 48U);
+  const std::vector<Bytes> store = parts(super.capabilities);
+  ASSERT_EQ(store.size(), 3U);
+  EXPECT_EQ(at(store[0], 2), super.capabilities.size());
+  EXPECT_EQ(at(store[0], 4), 2U);
+  EXPECT_EQ(store[2].size(), 10U);
+  spec.super_speed = false;
+  const drivers::UsbDescriptors high = drivers::uvc_descriptors(spec);
+  EXPECT_EQ(at(high.device, 3), 2U);
+  EXPECT_EQ(at(high.device, 7), 64U);
+  ASSERT_EQ(endpoint_of(high).size(), 1U);
+  EXPECT_EQ(at(endpoint_of(high)[0], 5), 512U >> 8);
+  EXPECT_TRUE(high.capabilities.empty());
+}
+
 TEST(UvcDescriptors, UnitsMakeAChainFromTheCameraToTheStream) {
   const drivers::UsbDescriptors d = drivers::uvc_descriptors(uvc_frames::spec());
   const std::vector<Bytes> control = class_specific(d.configuration, 0);

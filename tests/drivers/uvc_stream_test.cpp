@@ -84,7 +84,7 @@ TEST(UvcStream, FramesThatEndWithAPayloadATransferOrAPacketAreWhole) {
         UvcSpec spec = uvc_frames::spec(bytes, 1);
         spec.payload_bytes = payload;
         Rig rig(spec);
-        ASSERT_TRUE(rig.host.start(static_cast<unsigned>(UvcFormat::kY8), packets));
+        ASSERT_TRUE(rig.host.start(static_cast<unsigned>(UvcFormat::kY8), packets, kPacket));
         for (std::uint64_t k = 0; k < 3; ++k) {
           rig.offer(k);
           rig.host.hear();
@@ -98,7 +98,7 @@ TEST(UvcStream, FramesThatEndWithAPayloadATransferOrAPacketAreWhole) {
 }
 
 TEST(UvcStream, AStreamThatIsStoppedInAFrameBeginsAgainWithAWholeNewOne) {
-  const UvcSpec spec = uvc_frames::spec(640, 100);  // eight payloads
+  const UvcSpec spec = uvc_frames::spec(640, 200);  // eight payloads
   for (std::size_t transfers = 0; transfers < 12; ++transfers) {
     Rig rig(spec);
     ASSERT_TRUE(rig.host.start(1));
@@ -122,7 +122,7 @@ TEST(UvcStream, AStreamThatIsStoppedInAFrameBeginsAgainWithAWholeNewOne) {
 }
 
 TEST(UvcStream, TheNewestFrameWinsAndAFrameThatHasBegunIsFinished) {
-  const UvcSpec spec = uvc_frames::spec(640, 100);
+  const UvcSpec spec = uvc_frames::spec(640, 400);
   Rig rig(spec);
   ASSERT_TRUE(rig.host.start(1));
   rig.offer(0);
@@ -160,10 +160,10 @@ TEST(UvcStream, TheHostsCountAndTheFirstSequenceGiveTheCamerasSequence) {
 
 TEST(UvcStream, NothingGoesOutBeforeAFormatIsCommitted) {
   drivers::UvcStream stream(uvc_frames::spec());
-  EXPECT_FALSE(stream.give(16384).has_value());
+  EXPECT_FALSE(stream.give(32768).has_value());
   const Picture picture(uvc_frames::spec(), 1);
   stream.offer(picture.view);
-  EXPECT_FALSE(stream.give(16384).has_value());
+  EXPECT_FALSE(stream.give(32768).has_value());
   EXPECT_EQ(stream.counts().idle, 1U);
 }
 
@@ -171,7 +171,7 @@ TEST(UvcStream, TransfersOfAnyLengthMakeTheSamePayloads) {
   const UvcSpec spec = uvc_frames::spec(53, 7, 1);
   const Picture picture(spec, 4);
   std::vector<std::byte> expected;
-  for (const std::size_t room : {16384U, 1U, 2U, 3U, 5U, 6U, 7U, 100U}) {
+  for (const std::size_t room : {32768U, 1U, 2U, 3U, 5U, 6U, 7U, 100U}) {
     drivers::UvcStream stream(spec);
     stream.commit(UvcFormat::kY16);
     EXPECT_FALSE(stream.give(room).has_value());

@@ -8,7 +8,7 @@ camera_by_network() {
   beside device "$build/starloop_usb_device" --camera cam0
   device_pid=$!
   within 60 grep -q listening device.out
-  usbip attach -r 127.0.0.1 -b 1-1
+  attach
   within 30 uvc_is_there
 }
 uvc_is_there() {
@@ -23,7 +23,7 @@ uvc_is_there() {
   return 1
 }
 no_camera_by_network() {
-  usbip detach -p 0
+  detach
   within 10 grep -q 'host gone' device.out
   kill -9 $device_pid
   kill -INT $run_pid

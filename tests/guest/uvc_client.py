@@ -3,6 +3,7 @@
 drivers/uvc_protocol.md:
 
     uvc_client.py NODE WIDTH FRAMES
+    uvc_client.py NODE turned X Y          waits until its trim is that, in nanoradians, to one in a hundred
 
 Reads frames in Y16 that have a telemetry row, asks the camera what it knows of each, answers each with a trim, and sees
 the camera turn. Prints what it found; exit code 0: all of it was right.
@@ -102,8 +103,22 @@ def expect(what: str, got, wanted) -> None:
         sys.exit(f"{what}: {got}, and not {wanted}")
 
 
+def has_turned(camera: Camera, wanted: list) -> int:
+    end = time.monotonic() + 30
+    trim = None
+    while time.monotonic() < end:
+        trim = camera.frame(NONE)[3:5]
+        if all(abs(t - w) <= abs(w) / 100 for t, w in zip(trim, wanted)):
+            print(f"turned to {trim} nrad")
+            return 0
+        time.sleep(0.05)
+    sys.exit(f"not turned to {wanted} nrad: {trim}")
+
+
 def main() -> int:
     camera = Camera(sys.argv[1])
+    if sys.argv[2] == "turned":
+        return has_turned(camera, [int(word) for word in sys.argv[3:]])
     width, frames = int(sys.argv[2]), int(sys.argv[3])
     # What the driver asks of each control before it lets anybody use it.
     for selector, size in ((COMMAND, 72), (FRAME, 72), (SELECT, 8), (COUNTS, 128)):

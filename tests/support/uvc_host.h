@@ -84,13 +84,14 @@ class Host {
     return wish;
   }
   /// STREAMON. `packets`: most of one transfer.
-  bool start(unsigned format, std::size_t packets = 32) {
+  bool start(unsigned format, std::size_t packets = 32, std::size_t packet_bytes = 1024) {
     const auto offer = probe(format);
     if (!offer || !set(0, UVC_VS_COMMIT_CONTROL, bytes_of(*offer), 1)) return false;
     frame_bytes_ = offer->dwMaxVideoFrameSize;
     most_payload_ = offer->dwMaxPayloadTransferSize;
     transfer_bytes_ =
-        512 * std::min<std::size_t>(packets, (std::size_t{most_payload_} + 511) / 512);
+        packet_bytes *
+        std::min<std::size_t>(packets, (most_payload_ + packet_bytes - 1) / packet_bytes);
     sequence_ = 0xFFFFFFFF;
     last_id_ = -1;
     in_payload_ = skipping_ = false;

@@ -70,7 +70,7 @@ Bytes counts_request(std::uint32_t number) {
 
 /// A frame in one payload, as the camera gave it.
 void expect_frame(const Connection& host, Camera& camera, std::uint64_t sequence) {
-  host.say(submit(100, kIn, 1, 0, 16384));
+  host.say(submit(100, kIn, 1, 0, 32768));
   // What answers this has seen that.
   host.say(counts_request(101));
   ASSERT_EQ(host.hear_answer(true).size(), drivers::kUvcCountsBytes);

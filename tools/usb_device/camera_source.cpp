@@ -61,11 +61,6 @@ bool is_a_camera(const starloop_frame& f) {
 
 }  // namespace
 
-CameraSource::~CameraSource() {
-  thread_ = {};
-  close();
-}
-
 void CameraSource::close() {
   const std::lock_guard lock(mutex_);
   starloop_close(std::exchange(client_, nullptr));
@@ -119,10 +114,12 @@ drivers::UvcSpec CameraSource::wait_for_camera() {
   }
 }
 
-void CameraSource::follow(drivers::UvcCamera& camera, Post post, std::function<void()> changed) {
-  thread_ =
-      std::jthread([this, &camera, post = std::move(post), changed = std::move(changed)](
-                       const std::stop_token& stop) { read_frames(stop, camera, post, changed); });
+std::jthread CameraSource::follow(drivers::UvcCamera& camera, Post post,
+                                  std::function<void()> changed) {
+  return std::jthread([this, &camera, post = std::move(post),
+                       changed = std::move(changed)](const std::stop_token& stop) {
+    read_frames(stop, camera, post, changed);
+  });
 }
 
 void CameraSource::read_frames(const std::stop_token& stop, drivers::UvcCamera& camera,

@@ -22,15 +22,17 @@ class CameraSource {
   using Post = std::function<void(std::function<void()>)>;
 
   explicit CameraSource(std::string name) : name_(std::move(name)) {}
-  ~CameraSource();
+  ~CameraSource() { close(); }
   CameraSource(const CameraSource&) = delete;
   CameraSource& operator=(const CameraSource&) = delete;
 
   /// Waits for frames, as long as it takes, and says what camera it is: its size from the first,
   /// its period from two.
   [[nodiscard]] drivers::UvcSpec wait_for_camera();
-  /// Every frame is offered to `camera`; ends with `changed` when one is of another size.
-  void follow(drivers::UvcCamera& camera, Post post, std::function<void()> changed);
+  /// A thread that offers every frame to `camera`, until it is asked to stop, or calls `changed`
+  /// and ends: one is of another size.
+  [[nodiscard]] std::jthread follow(drivers::UvcCamera& camera, Post post,
+                                    std::function<void()> changed);
   /// False: the camera is gone, or has not taken the last ones.
   [[nodiscard]] bool send(const hil::Command& command);
 
@@ -44,7 +46,6 @@ class CameraSource {
   std::mutex mutex_;  // the client is not closed while something is sent
   starloop_client* client_ = nullptr;
   std::binary_semaphore offered_{0};
-  std::jthread thread_;
 };
 
 }  // namespace usb_device

@@ -38,6 +38,7 @@ struct Options {
   std::string address = "127.0.0.1";
   std::uint16_t port = 3240;
   std::string camera;
+  bool high_speed = false;
   std::string shm = "starloop-usb";
   int width_px = 1024;
   int height_px = 1024;
@@ -163,21 +164,27 @@ void report(const drivers::UvcCounts& c) {
   std::fflush(stdout);
 }
 
+/// Until the source's frames become those of another camera.
+void be_one_camera(const Options& o, UsbIpServer& server) {
+  usb_device::CameraSource source(o.camera);
+  drivers::UvcSpec spec = source.wait_for_camera();
+  spec.super_speed = !o.high_speed;
+  drivers::UvcCamera camera(spec, [&](const hil::Command& c) { return source.send(c); });
+  std::printf("listening on %s:%u, a camera of %d x %d%s, %d bits, every %.3f ms\n",
+              o.address.c_str(), server.port(), spec.width_px, spec.height_px,
+              spec.rows_below > 0 ? " and a telemetry row" : "", spec.bits,
+              static_cast<double>(spec.period.count()) / 1e6);
+  std::fflush(stdout);
+  const std::jthread frames = source.follow(
+      camera, [&](std::function<void()> work) { server.post(std::move(work)); },
+      [&] { server.stop(); });
+  server.run(camera, {.heard = {}, .gone = [&] { report(camera.counts()); }});
+}
+
 [[noreturn]] void be_camera(const Options& o) {
   UsbIpServer server(o.address, o.port);
   for (;;) {
-    usb_device::CameraSource source(o.camera);
-    const drivers::UvcSpec spec = source.wait_for_camera();
-    drivers::UvcCamera camera(spec, [&](const hil::Command& c) { return source.send(c); });
-    std::printf("listening on %s:%u, a camera of %d x %d%s, %d bits, every %.3f ms\n",
-                o.address.c_str(), server.port(), spec.width_px, spec.height_px,
-                spec.rows_below > 0 ? " and a telemetry row" : "", spec.bits,
-                static_cast<double>(spec.period.count()) / 1e6);
-    std::fflush(stdout);
-    source.follow(
-        camera, [&](std::function<void()> work) { server.post(std::move(work)); },
-        [&] { server.stop(); });
-    server.run(camera, {.heard = {}, .gone = [&] { report(camera.counts()); }});
+    be_one_camera(o, server);
     std::printf("the frames have changed: unplugged\n");
     std::fflush(stdout);
   }
@@ -198,6 +205,9 @@ int main(int argc, char** argv) {
   app.add_option("--port", o.port, "to listen on; 0: the system chooses")->capture_default_str();
   CLI::Option* camera = app.add_option(
       "--camera", o.camera, "be a camera with the frames of a run whose link.to is shm:NAME");
+  app.add_flag("--high-speed", o.high_speed,
+               "of the camera: no SuperSpeed, for hosts that do not know it")
+      ->needs(camera);
   app.add_option("--shm", o.shm, "name of the shared memory that gets the frames")
       ->capture_default_str()
       ->excludes(camera);
