@@ -180,12 +180,14 @@ TEST_F(UvcCamera, ARefusalSaysWhyOnce) {
   EXPECT_EQ(host_.error_code(), 6U) << "no such control";
   EXPECT_FALSE(host_.set(kUnit, number_of(UvcSelector::kFrame), Bytes(72)));
   EXPECT_EQ(host_.error_code(), 7U) << "it cannot be set";
+  EXPECT_FALSE(host_.set(kUnit, number_of(UvcSelector::kCommand), Bytes(71)));
+  EXPECT_EQ(host_.error_code(), 7U) << "another length";
   EXPECT_FALSE(pan_tilt(648001, 0));
   EXPECT_EQ(host_.error_code(), 4U) << "out of range";
   EXPECT_EQ(host_.error_code(), 4U) << "asking does not change it";
   EXPECT_TRUE(pan_tilt(0, 0));
   EXPECT_EQ(host_.error_code(), 0U);
-  EXPECT_EQ(counts().stalled, 4U);
+  EXPECT_EQ(counts().stalled, 5U);
 }
 
 TEST_F(UvcCamera, ACommandOfTheExtensionUnitArrivesWithItsNumbers) {

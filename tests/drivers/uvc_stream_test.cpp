@@ -99,11 +99,12 @@ TEST(UvcStream, FramesThatEndWithAPayloadATransferOrAPacketAreWhole) {
 
 TEST(UvcStream, AStreamThatIsStoppedInAFrameBeginsAgainWithAWholeNewOne) {
   const UvcSpec spec = uvc_frames::spec(640, 200);  // eight payloads
-  for (std::size_t transfers = 0; transfers < 12; ++transfers) {
+  for (std::size_t transfers = 0; transfers < 24; ++transfers) {
     Rig rig(spec);
-    ASSERT_TRUE(rig.host.start(1));
+    // Transfers as long as payloads, and a quarter of them.
+    ASSERT_TRUE(rig.host.start(1, transfers % 2 == 0 ? 32 : 8));
     rig.offer(1);
-    rig.host.hear(transfers);
+    rig.host.hear(transfers / 2);
     static_cast<void>(rig.host.frames());
     ASSERT_TRUE(rig.host.stop());
     rig.offer(2);  // nobody streams
