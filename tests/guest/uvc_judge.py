@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Checks frames of the pattern in the formats of eight bits, from stdin: uvc_judge.py GREY|YUYV [ROWS_BELOW]
+"""Checks frames of the pattern in the formats of eight bits: uvc_judge.py GREY.raw YUYV.raw
 
-The brightness is the pattern's highest eight bits of eleven; below it the telemetry row's bytes as they are."""
+The brightness is the pattern's highest eight bits of eleven; below it is a telemetry row, its bytes as they are."""
 import sys
 
 import numpy as np
@@ -9,27 +9,28 @@ import numpy as np
 WIDTH = HEIGHT = 1024
 
 
-def main() -> int:
-    step = 2 if sys.argv[1] == "YUYV" else 1
-    rows_below = int(sys.argv[2]) if len(sys.argv) > 2 else 0
-    size = step * WIDTH * (HEIGHT + rows_below)
+def judge(name: str) -> None:
+    step = 2 if name.startswith("YUYV") else 1
+    size = step * WIDTH * (HEIGHT + 1)
     ramp = np.arange(WIDTH) + 3 * np.arange(HEIGHT)[:, None]
-    frames = 0
-    while len(data := sys.stdin.buffer.read(size)) == size:
-        pixels = np.frombuffer(data, "u1").reshape(HEIGHT + rows_below, WIDTH, step)
+    with open(name, "rb") as file:
+        data = file.read()
+    frames, left = divmod(len(data), size)
+    if frames == 0 or left:
+        sys.exit(f"{name}: {len(data)} bytes are no whole frames of {size}")
+    for n in range(frames):
+        pixels = np.frombuffer(data, "u1", size, n * size).reshape(HEIGHT + 1, WIDTH, step)
         if step == 2 and (pixels[:, :, 1] != 0x80).any():
-            sys.exit(f"frame {frames}: it has colours")
-        bright = pixels[:HEIGHT, :, 0]
-        if rows_below and bytes(pixels[HEIGHT, :4, 0]) != b"SLTR":
-            sys.exit(f"frame {frames}: no telemetry row: {bytes(pixels[HEIGHT, :8, 0])}")
-        # The row knows the frame; without it, try them all.
-        numbers = [int.from_bytes(bytes(pixels[HEIGHT, 8:16, 0]), "little")] if rows_below else range(2048)
-        if not any((bright == ((ramp + 7 * k) % 2048 >> 3)).all() for k in numbers):
-            sys.exit(f"frame {frames}: not the pattern")
-        frames += 1
-    print(f"{frames} frames, {len(data)} bytes left")
-    return 0 if frames > 0 and not data else 1
+            sys.exit(f"{name}, frame {n}: it has colours")
+        row = bytes(pixels[HEIGHT, :, 0])
+        if row[:4] != b"SLTR":
+            sys.exit(f"{name}, frame {n}: no telemetry row: {row[:16].hex()}")
+        k = int.from_bytes(row[8:16], "little")
+        if (pixels[:HEIGHT, :, 0] != ((ramp + 7 * k) % 2048 >> 3)).any():
+            sys.exit(f"{name}, frame {n}: not the pattern of {k}")
+    print(f"{name}: {frames} frames")
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    for argument in sys.argv[1:]:
+        judge(argument)
