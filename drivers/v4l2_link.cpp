@@ -148,8 +148,9 @@ void V4l2Link::open_node() {
     fail(node_ + " (" + text_of(c.card, sizeof c.card) + ") takes no frames: it is no output");
   const bool can_write = (can & V4L2_CAP_READWRITE) != 0;
   const bool can_map = (can & V4L2_CAP_STREAMING) != 0;
-  mapped_ =
-      spec_.method == V4l2Method::kMapped || (spec_.method == V4l2Method::kAuto && !can_write);
+  // Others say that they take write() and do not, or have nothing to lose by their own buffers.
+  const bool writes = can_write && (is_loopback_ || !can_map);
+  mapped_ = spec_.method == V4l2Method::kMapped || (spec_.method == V4l2Method::kAuto && !writes);
   if (mapped_ ? !can_map : !can_write)
     fail(node_ + (mapped_ ? " has no buffers to map" : " takes no write()"));
   negotiate();

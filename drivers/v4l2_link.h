@@ -15,7 +15,7 @@ enum class V4l2Format : std::uint8_t {
 };
 /// How frames go into the node.
 enum class V4l2Method : std::uint8_t {
-  kAuto,   ///< write() where the driver has it, else mapped
+  kAuto,   ///< write() into v4l2loopback, else mapped where the driver has that
   kWrite,  ///< one write() a frame
   kMapped  ///< into mapped buffers
 };

@@ -187,6 +187,7 @@ gboolean V4l2NodeModel::Self::handle_write(UMockdevIoctlClient* client) {
   UMockdevIoctlData* argument = umockdev_ioctl_client_get_arg(client);
   asked.emplace_back("WRITE");
   int error = plugged ? failure("WRITE") : ENODEV;
+  if (!spec.loopback && error == 0) error = EINVAL;  // as vivid does, which says it can
   const auto given = static_cast<std::size_t>(argument->data_len);
   const std::size_t n = cut > 0 ? std::min(std::exchange(cut, std::size_t{0}), given) : given;
   if (error == 0) {
