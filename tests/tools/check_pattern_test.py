@@ -5,7 +5,7 @@ import sys
 
 import numpy as np
 
-WIDTH, HEIGHT = 40, 30
+WIDTH, HEIGHT = 60, 30
 
 
 def frame(k: int, bits: int = 11, rows_below: int = 0) -> np.ndarray:
@@ -43,3 +43,42 @@ old = [np.zeros_like(good[0]), *good]
 expect(check(old, "--first", "1"), 0, "6 frames, 0 wrong")
 expect(check(good, tail=b"abc"), 1, "3 bytes at the end")
 expect(check([]), 1, "0 frames")
+
+
+# A telemetry row, byte by byte as hil/telemetry_row.h has it; its checksum by another way than the tool's.
+def crc32c(data: bytes) -> int:
+    bits = [int(b) for byte in data for b in f"{byte:08b}"[::-1]] + [0] * 32
+    for i in range(32):
+        bits[i] ^= 1
+    for i in range(8 * len(data)):
+        if bits[i]:
+            for j, b in enumerate(f"{0x11EDC6F41:033b}"):
+                bits[i + j] ^= int(b)
+    return int("".join(map(str, bits[-32:][::-1])), 2) ^ 0xFFFFFFFF
+
+
+def with_row(image: np.ndarray, k: int) -> np.ndarray:
+    said = b"SLTR\2\x38\0\0" + k.to_bytes(8, "little") + bytes(36)
+    said += crc32c(said).to_bytes(4, "little")
+    row = np.zeros((1, WIDTH), image.dtype)
+    row[0, :56] = list(said)
+    return np.vstack([image, row])
+
+
+assert crc32c(b"123456789") == 0xE3069283
+rows = [with_row(frame(k), k) for k in (5, 6, 5000)]
+expect(check(rows, "--telemetry-row"), 0, f"3 frames, 0 wrong, {4993 % 2048} missing")
+spoilt = [f.copy() for f in rows]
+spoilt[1][HEIGHT, 9] ^= 1
+expect(check(spoilt, "--telemetry-row"), 1, "frame 2: the row below it is no telemetry")
+# A row that is whole, below the image of another frame.
+expect(check([with_row(frame(3), 4)], "--telemetry-row"), 1, "frame 1: 1800 pixels wrong")
+grey = [with_row((frame(k) >> 3).astype("u1"), k) for k in range(3)]
+expect(check(grey, "--telemetry-row", "--format", "grey"), 0, "3 frames, 0 wrong, 0 missing")
+grey[1][5, 5] ^= 1
+expect(check(grey, "--telemetry-row", "--format", "grey"), 1, "frame 2: 1 pixels wrong")
+top = [(frame(k) << 5).astype("<u2") for k in range(3)]
+expect(check(top, "--format", "y16-top"), 0, "3 frames, 0 wrong, 0 missing")
+top[2][0, 1] ^= 1
+expect(check(top, "--format", "y16-top"), 1, "frame 3: 1 pixels wrong, the first at column 1, row 0")
+expect(check(good, "--format", "y16-top"), 1, "wrong")
