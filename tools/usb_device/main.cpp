@@ -12,145 +12,49 @@
 //   sudo modprobe vhci-hcd; sudo usbip attach -r HOST -b 1-1       (on the on-board computer)
 
 #include <cstdio>
-#include <cstring>
 #include <exception>
-#include <memory>
 #include <thread>
 
 #include <CLI/CLI.hpp>
 
-#include "drivers/pixel_packing.h"
-#include "drivers/shm_link.h"
 #include "drivers/usb_device/injection_device.h"
-#include "hil/space_packet.h"
-#include "hil/telemetry_packet.h"
 #include "tools/usb_device/camera_source.h"
+#include "tools/usb_device/gadget.h"
+#include "tools/usb_device/hand_over.h"
 #include "tools/usb_device/usbip_server.h"
 
 namespace {
 
-using engine::Duration;
 using usb_device::UsbIpServer;
-
-constexpr Duration kPatience{50'000'000};
 
 struct Options {
   std::string address = "127.0.0.1";
   std::uint16_t port = 3240;
   std::string camera;
   bool high_speed = false;
-  std::string shm = "starloop-usb";
-  int width_px = 1024;
-  int height_px = 1024;
-  int frames = 3;
+  std::string gadget;  ///< a mounted functionfs; empty: USB/IP
+  usb_device::HandOverSpec board;
 };
 
-drivers::UsbLimits limits_of(const Options& o) {
-  drivers::UsbLimits l;
-  l.formats = 3;
-  l.width_px = o.width_px;
-  l.height_px = o.height_px + 1;
-  l.payload_bytes = static_cast<std::uint32_t>(
-      drivers::usb_payload_bytes(drivers::PixelFormat::kPlain16, l.width_px, l.height_px));
-  l.frames = static_cast<unsigned>(o.frames);
-  return l;
+void report(const usb_device::HandOverCounts& c) {
+  std::printf("host gone: %llu frames, %llu of them nobody took in time\n",
+              static_cast<unsigned long long>(c.frames),
+              static_cast<unsigned long long>(c.frames - c.taken));
+  std::fflush(stdout);
 }
-
-/// What the camera said of itself behind the pixels.
-void take_news(std::span<const std::byte> news, hil::Frame& frame) {
-  constexpr std::size_t kSpaceHeader = 6;
-  while (news.size() > kSpaceHeader) {
-    const std::size_t bytes =
-        7 + (std::to_integer<std::size_t>(news[4]) << 8 | std::to_integer<std::size_t>(news[5]));
-    if (bytes > news.size()) return;
-    if (const auto one = hil::decode_telemetry(news.first(bytes)); one.ok()) {
-      if (const auto* f = std::get_if<hil::FrameNews>(&one.value())) frame.counts = f->counts;
-      if (const auto* a = std::get_if<hil::AttitudeNews>(&one.value())) {
-        frame.measured = a->measured;
-        frame.trim_rad = a->trim_rad;
-      }
-    }
-    news = news.subspan(bytes);
-  }
-}
-
-/// Frames of an injection device into shared memory, and commands of their reader back.
-class HandOver {
- public:
-  explicit HandOver(const Options& o)
-      : shm_({.name = o.shm, .slots = o.frames + 1}, o.width_px, o.height_px),
-        pixels_(static_cast<std::size_t>(o.width_px) * static_cast<std::size_t>(o.height_px + 1)) {}
-
-  void take_frames(drivers::FrameIntake& intake) {
-    for (auto f = intake.front(); f; f = intake.front()) {
-      const drivers::UsbFrameHeader& h = f->header;
-      const auto width = static_cast<std::size_t>(h.width_px);
-      const std::size_t image = width * static_cast<std::size_t>(h.height_px);
-      const std::size_t all = image + width * static_cast<std::size_t>(h.rows_below);
-      const std::span<std::uint16_t> pixels = std::span(pixels_).first(all);
-      const std::size_t bytes = f->payload.size() - h.news_bytes;
-      if (h.format == drivers::PixelFormat::kPacked11) {
-        drivers::unpack_pixels(f->payload.first(bytes), pixels);
-      } else {
-        std::memcpy(pixels.data(), f->payload.data(), bytes);
-      }
-      engine::DnImage picture(h.width_px, h.height_px);
-      std::copy_n(pixels.begin(), image, picture.pixels().begin());
-      hil::Frame frame;
-      frame.sequence = h.sequence;
-      frame.shutter_open = h.shutter_open;
-      frame.exposure = h.exposure;
-      frame.bits = h.bits;
-      frame.pixels = &picture;
-      frame.telemetry_row = pixels.subspan(image);
-      take_news(f->payload.subspan(bytes), frame);
-      ++frames_;
-      if (!shm_.send(frame, Duration{}).ok()) ++not_taken_;
-      intake.pop();
-    }
-  }
-
-  /// A thread that gives each command to `take`.
-  template <class Take>
-  [[nodiscard]] std::jthread return_commands(Take take) {
-    return std::jthread([this, take](const std::stop_token& stop) {
-      while (!stop.stop_requested()) {
-        const auto command = shm_.receive(kPatience);
-        if (command.ok()) {
-          take(hil::encode_command(command.value()));
-        } else if (command.error().fault == engine::Fault::kDisconnected) {
-          std::this_thread::sleep_for(kPatience);
-        }
-      }
-    });
-  }
-
-  void report() const {
-    std::printf("host gone: %llu frames, %llu of them nobody took in time\n",
-                static_cast<unsigned long long>(frames_),
-                static_cast<unsigned long long>(not_taken_));
-    std::fflush(stdout);
-  }
-
- private:
-  drivers::ShmLink shm_;
-  std::vector<std::uint16_t> pixels_;
-  std::uint64_t frames_ = 0;
-  std::uint64_t not_taken_ = 0;
-};
 
 void be_injection_device(const Options& o) {
-  HandOver hand_over(o);
-  drivers::InjectionDevice device(limits_of(o));
+  usb_device::HandOver hand_over(o.board);
+  drivers::InjectionDevice device(usb_device::limits_of(o.board));
   UsbIpServer server(o.address, o.port);
   std::printf("listening on %s:%u, frames to shared memory %s\n", o.address.c_str(), server.port(),
-              o.shm.c_str());
+              o.board.shm.c_str());
   std::fflush(stdout);
   const std::jthread commands = hand_over.return_commands([&](const hil::CommandPacket& packet) {
     server.post([&device, packet] { static_cast<void>(device.intake().command(packet.bytes())); });
   });
   server.run(device, {.heard = [&] { hand_over.take_frames(device.intake()); },
-                      .gone = [&] { hand_over.report(); }});
+                      .gone = [&] { report(hand_over.counts()); }});
 }
 
 void report(const drivers::UvcCounts& c) {
@@ -208,23 +112,31 @@ int main(int argc, char** argv) {
   app.add_flag("--high-speed", o.high_speed,
                "of the camera: no SuperSpeed, for hosts that do not know it")
       ->needs(camera);
-  app.add_option("--shm", o.shm, "name of the shared memory that gets the frames")
+  app.add_option("--shm", o.board.shm, "name of the shared memory that gets the frames")
       ->capture_default_str()
       ->excludes(camera);
-  app.add_option("--width", o.width_px, "largest frame")
+  app.add_option("--width", o.board.width_px, "largest frame")
       ->check(CLI::Range(1, 4096))
       ->capture_default_str()
       ->excludes(camera);
-  app.add_option("--height", o.height_px, "largest frame, without a telemetry row")
+  app.add_option("--height", o.board.height_px, "largest frame, without a telemetry row")
       ->check(CLI::Range(1, 4096))
       ->capture_default_str()
       ->excludes(camera);
-  app.add_option("--frames", o.frames, "that it has room for")
+  app.add_option("--frames", o.board.frames, "that it has room for")
       ->check(CLI::Range(1, 15))
       ->capture_default_str()
       ->excludes(camera);
+  app.add_option("--gadget", o.gadget,
+                 "instead of USB/IP: serves the functionfs mounted there, of a gadget on this "
+                 "machine's USB device port (tools/usb_device/gadget.sh makes one)")
+      ->excludes(camera);
   CLI11_PARSE(app, argc, argv);
   try {
+    if (!o.gadget.empty()) {
+      usb_device::run_gadget(o.gadget, o.board);
+      return 0;
+    }
     if (!o.camera.empty()) be_camera(o);
     be_injection_device(o);
   } catch (const std::exception& e) {
