@@ -43,6 +43,16 @@ run="/run/starloop-gadget-$name"
 ffs="$run/ffs"
 pid=''
 
+# Of a program that this name left behind.
+left_behind() {
+  left="$(cat "$run/program" 2>/dev/null || true)"
+  if [ -n "$left" ] && grep -q starloop_usb_device "/proc/$left/cmdline" 2>/dev/null; then
+    kill -KILL "$left" || true
+    tries=0
+    while [ -e "/proc/$left" ] && [ "$tries" -lt 50 ]; do tries=$((tries + 1)); sleep 0.1; done
+  fi
+}
+
 # Tells the host first: nobody then waits in the middle of a transfer.
 take_down() {
   if [ -e "$gadget/UDC" ]; then echo '' >"$gadget/UDC" 2>/dev/null || true; fi
@@ -81,6 +91,7 @@ fi
 if [ -s "$run/pid" ] && kill -0 "$(cat "$run/pid")" 2>/dev/null; then
   fail "gadget $name is there already, of process $(cat "$run/pid")"
 fi
+left_behind
 take_down
 for file in "$config"/usb_gadget/*/UDC; do
   if [ -e "$file" ] && [ "$(cat "$file")" = "$udc" ]; then
@@ -110,6 +121,7 @@ mount -t functionfs "$name" "$ffs" || fail "functionfs cannot be mounted at $ffs
 
 "$program" --gadget "$ffs" "$@" &
 pid=$!
+echo "$pid" >"$run/program"
 # Its endpoints appear when it has said what it is; to bind it before is an error.
 tries=0
 until [ -e "$ffs/ep2" ]; do
