@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
 # Installs what Starloop needs from Debian 12's own packages; only what is missing, and says so.
+#   tools/setup.sh [--full | --guest]
 set -euo pipefail
 
 packages=(
@@ -14,6 +15,12 @@ packages=(
 )
 # The slow checks of tools/test.sh --full only.
 if [[ "${1:-}" == "--full" ]]; then packages+=(clang-format clang-tidy); fi
+# --guest: what tests/guest boots, and the readers that it has there. The kernel itself is not installed.
+guest=(
+  qemu-system-x86 seabios busybox-static kmod cpio make gcc-12
+  v4l-utils usbip ffmpeg gstreamer1.0-tools gstreamer1.0-plugins-good
+)
+if [[ "${1:-}" == "--guest" ]]; then packages=("${guest[@]}"); fi
 
 missing=()
 for package in "${packages[@]}"; do

@@ -1,0 +1,17 @@
+# Readers that leave, and one that is killed with a buffer in its hands, change nothing for the run and the next.
+loopback exclusive_caps=1
+pattern run --set run.frame_rate_hz=10 --set link.to=v4l2:starloop
+run=$!
+within 120 shows_format Y16
+reader="$build/tests/guest/guest_reader"
+for round in 1 2; do
+  "$reader" --frames 5
+  beside hangs "$reader" --hangs
+  hangs=$!
+  within 60 grep -q holding hangs.out
+  kill -9 $hangs
+done
+"$reader" --frames 10 | tee last.out
+equal "whole frames of the last reader" "$(count last whole)" 10
+stop_run run $run
+equal "refused by the link" "$(report run frames.faults)" 0
