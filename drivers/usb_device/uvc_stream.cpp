@@ -21,13 +21,23 @@ std::uint16_t pixel(std::span<const std::byte> in, std::size_t i) noexcept {
   return get<std::uint16_t>(in, 2 * i);
 }
 
-/// Rows of brightness, each byte `step` bytes behind the one before.
-void put_bytes(std::span<const std::byte> in, int down, std::size_t width, std::size_t row_bytes,
-               std::size_t step, std::byte* out) noexcept {
+/// Rows of brightness, and of no colour behind each where pixels have two bytes. Returns where it
+/// ended.
+template <std::size_t kPixelBytes>
+std::byte* put_rows(std::span<const std::byte> in, int down, std::size_t width,
+                    std::byte* out) noexcept {
   const std::size_t pixels = in.size() / 2;
-  for (std::size_t start = 0; start < pixels; start += width, out += row_bytes)
-    for (std::size_t u = 0; u < width; ++u)
-      out[step * u] = static_cast<std::byte>(pixel(in, start + u) >> down);
+  for (std::size_t start = 0; start < pixels; start += width) {
+    for (std::size_t u = 0; u < width; ++u, out += kPixelBytes) {
+      out[0] = static_cast<std::byte>(pixel(in, start + u) >> down);
+      if constexpr (kPixelBytes == 2) out[1] = kNoColour;
+    }
+    if (kPixelBytes == 2 && width % 2 != 0) {
+      *out++ = std::byte{0};
+      *out++ = kNoColour;
+    }
+  }
+  return out;
 }
 
 }  // namespace
@@ -39,19 +49,10 @@ void uvc_pixels(const UvcSpec& spec, UvcFormat format, const FrameView& frame,
     std::copy(frame.telemetry_row.begin(), frame.telemetry_row.end(), rest);
     return;
   }
-  const UvcFrameSize size = uvc_frame_size(spec, format);
+  const auto put = format == UvcFormat::kY8 ? put_rows<1> : put_rows<2>;
   const auto width = static_cast<std::size_t>(spec.width_px);
-  const std::size_t step = format == UvcFormat::kYuy2 ? 2 : 1;
-  const std::size_t row_bytes = static_cast<std::size_t>(size.width_px) * step;
-  if (step == 2) {
-    for (std::size_t i = 0; i < size.bytes; i += 2) {
-      out[i] = std::byte{0};
-      out[i + 1] = kNoColour;
-    }
-  }
-  put_bytes(frame.pixels, std::max(0, spec.bits - 8), width, row_bytes, step, out.data());
-  put_bytes(frame.telemetry_row, 0, width, row_bytes, step,
-            out.data() + row_bytes * static_cast<std::size_t>(spec.height_px));
+  std::byte* row = put(frame.pixels, std::max(0, spec.bits - 8), width, out.data());
+  put(frame.telemetry_row, 0, width, row);
 }
 
 UvcStream::UvcStream(const UvcSpec& spec) : spec_(spec) {

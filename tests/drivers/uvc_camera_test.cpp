@@ -99,6 +99,19 @@ TEST_F(UvcCamera, AKernelCanEnumerateIt) {
   EXPECT_FALSE(host_.tell(0x02, 1, 0, 0x82, {})) << "nor this endpoint";
 }
 
+TEST_F(UvcCamera, AListShowsBothInterfacesAndTheSpeed) {
+  drivers::UsbIpDevice device(camera_);
+  ASSERT_TRUE(device.take(usbip_host::Words().half(0x0111).half(0x8005).word(0).bytes()));
+  const Bytes reply = device.replies();
+  ASSERT_EQ(reply.size(), 8U + 4 + 312 + 2 * 4);
+  const auto at = [&](std::size_t i) { return std::to_integer<unsigned>(reply[i]); };
+  EXPECT_EQ(at(12 + 288 + 11), 5U);  // SuperSpeed
+  EXPECT_EQ(at(12 + 306), 0xEFU);    // class of the device
+  EXPECT_EQ(at(12 + 311), 2U);       // interfaces
+  EXPECT_EQ(at(324) << 8 | at(325), 0x0E01U);
+  EXPECT_EQ(at(328) << 8 | at(329), 0x0E02U);
+}
+
 TEST_F(UvcCamera, AProbeIsAnsweredWithWhatThereIs) {
   struct Wish {
     unsigned format;
