@@ -70,7 +70,7 @@ struct UvcCounts {
 
   friend bool operator==(const UvcCounts&, const UvcCounts&) = default;
 };
-inline constexpr std::size_t kUvcCountsBytes = 8 * 16;
+inline constexpr std::size_t kUvcCountsBytes = 16 * sizeof(std::uint64_t);
 using UvcCountsBytes = std::array<std::byte, kUvcCountsBytes>;
 [[nodiscard]] UvcCountsBytes encode_uvc_counts(const UvcCounts& counts) noexcept;
 /// Pre: kUvcCountsBytes.

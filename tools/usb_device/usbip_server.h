@@ -57,7 +57,7 @@ class UsbIpServer {
   bool reading_ = false;
   bool writing_ = false;
   bool stopping_ = false;
-  std::array<std::byte, 256 * 1024> in_{};
+  std::array<std::byte, 256UL * 1024> in_{};
   std::vector<std::byte> out_;
 };
 
