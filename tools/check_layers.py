@@ -33,6 +33,8 @@ OWNERS = [
     ("openssl/", {"hil"}),
     ("libusb", {"drivers"}),
     ("linux/videodev2", {"drivers"}),
+    ("linux/usb/", {"drivers"}),
+    ("linux/aio_abi", {"drivers"}),
     ("opencv2/", {"tools"}),
     ("spdlog/", {"tools"}),
     ("CLI/", {"tools"}),

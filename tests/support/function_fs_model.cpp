@@ -53,6 +53,7 @@ void FunctionFsModel::end_request(bool stalled) {
 }
 
 FunctionFsModel::Result FunctionFsModel::read_control(std::span<std::byte> out) {
+  if (before_event_) std::exchange(before_event_, nullptr)();
   if (pending_ == Pending::kGivenUp) {
     pending_ = Pending::kNone;
     return -EIDRM;
@@ -133,7 +134,7 @@ void FunctionFsModel::end_reads(Result result) {
 }
 
 bool FunctionFsModel::read(std::size_t slot, std::span<std::byte> place) {
-  if (refuses_) return false;
+  if (refuses_reads_) return false;
   if (!plugged_) {
     ended_.push_back({true, slot, -EAGAIN});
     return true;
@@ -144,7 +145,7 @@ bool FunctionFsModel::read(std::size_t slot, std::span<std::byte> place) {
 }
 
 bool FunctionFsModel::write(std::span<const std::byte> bytes) {
-  if (refuses_) return false;
+  if (refuses_writes_) return false;
   if (!plugged_) {
     ended_.push_back({false, 0, -EAGAIN});
     return true;

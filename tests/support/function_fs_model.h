@@ -3,7 +3,9 @@
 #include <array>
 #include <atomic>
 #include <deque>
+#include <functional>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "drivers/usb_device/function_files.h"
@@ -49,7 +51,10 @@ class FunctionFsModel final : public drivers::FunctionFiles {
   void stop_listening() { listens_ = false; }
 
   // The kernel.
-  void refuse_transfers(bool refuse) { refuses_ = refuse; }
+  void refuse_reads(bool refuse) { refuses_reads_ = refuse; }
+  void refuse_writes(bool refuse) { refuses_writes_ = refuse; }
+  /// Happens when the program next looks for events, before it sees one.
+  void before_next_event(std::function<void()> what) { before_event_ = std::move(what); }
   /// The last two ends of transfers are told the other way round.
   void swap_ends();
   [[nodiscard]] std::size_t reads_in_flight() const { return reads_.size(); }
@@ -104,6 +109,8 @@ class FunctionFsModel final : public drivers::FunctionFiles {
   bool writing_ = false;
   Bytes in_hand_;  // of a message
   std::deque<Bytes> messages_;
-  bool refuses_ = false;
+  bool refuses_reads_ = false;
+  bool refuses_writes_ = false;
+  std::function<void()> before_event_;
   std::atomic<int> wakes_{0};
 };

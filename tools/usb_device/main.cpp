@@ -10,6 +10,8 @@
 //   starloop run config/flyby.toml --set link.to=shm:cam0 &
 //   starloop_usb_device --camera cam0                              (where starloop runs)
 //   sudo modprobe vhci-hcd; sudo usbip attach -r HOST -b 1-1       (on the on-board computer)
+//
+// On a board with a USB device port it is the device itself: tools/usb_device/gadget.sh.
 
 #include <cstdio>
 #include <exception>
