@@ -22,6 +22,7 @@ void FrameIntake::reset(std::uint32_t session) noexcept {
   status_ = {};
   status_.credits = limits_.frames;
   never_told_ = true;
+  told_last_ = false;
 }
 
 void FrameIntake::take(std::span<const std::byte> bytes, bool ends) noexcept {
@@ -117,14 +118,20 @@ bool FrameIntake::command(std::span<const std::byte> packet) noexcept {
 }
 
 std::size_t FrameIntake::next_message(std::span<std::byte> out) noexcept {
-  if (never_told_ || !(status_ == told_)) {
+  // A status that changes faster than messages go out does not keep commands back.
+  const bool commands_turn = waiting_commands_ > 0 && std::exchange(told_last_, false);
+  if (never_told_ || (!(status_ == told_) && !commands_turn)) {
     never_told_ = false;
+    told_last_ = true;
     told_ = status_;
     const std::size_t bytes = status_message(out);
     ++count_;
     return bytes;
   }
-  if (waiting_commands_ == 0) return 0;
+  if (waiting_commands_ == 0) {
+    told_last_ = false;
+    return 0;
+  }
   const Packet& packet = commands_[first_command_];
   UsbMessage m;
   m.kind = UsbMessage::Kind::kCommand;

@@ -78,6 +78,7 @@ class FrameIntake {
   UsbStatus status_;
   UsbStatus told_;
   bool never_told_ = true;
+  bool told_last_ = false;  // the last message was a status
 };
 
 }  // namespace drivers

@@ -191,6 +191,24 @@ TEST(FrameIntake, SaysItsStatusWhenThereIsNewsAndCommandsInOrder) {
   EXPECT_FALSE(next().has_value());
 }
 
+TEST(FrameIntake, AStatusThatChangesAllTheTimeDoesNotKeepCommandsBack) {
+  FrameIntake intake(usb_frames::limits());
+  std::array<std::byte, drivers::kLargestUsbMessage> out{};
+  int commands = 0;
+  for (std::uint64_t k = 1; k <= 10; ++k) {
+    take(intake, frame_bytes(k), 512);
+    expect_whole(intake, k);
+    const std::array packet{std::byte{7}};
+    ASSERT_TRUE(intake.command(packet));
+    // One message a frame: half of them are statuses.
+    const std::size_t n = intake.next_message(out);
+    const auto m = drivers::decode_usb_message(std::span(out).first(n));
+    ASSERT_TRUE(m.ok());
+    commands += m.value().kind == UsbMessage::Kind::kCommand ? 1 : 0;
+  }
+  EXPECT_EQ(commands, 5);
+}
+
 /// Whatever is on the cable: every frame that comes out is one that went in, unharmed, and after
 /// the next end the device is in step again.
 TEST(FrameIntake, GarbageOfAnyKindCostsNoFrameButItsOwn) {
