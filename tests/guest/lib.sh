@@ -56,9 +56,12 @@ for keys in sys.argv[2:]:
 }
 
 # The module anew, with these options: one node, "starloop".
-loopback() {
+no_loopback() {
   no_camera
   if grep -q ^v4l2loopback /proc/modules; then within 10 rmmod v4l2loopback; fi
+}
+loopback() {
+  no_loopback
   modprobe v4l2loopback devices=1 video_nr=20 card_label=starloop "$@"
   within 10 test -c $node
 }

@@ -1,5 +1,5 @@
 # Without the module `run` and `links` say how to get it; with it `links` shows the node by its label.
-modprobe -r v4l2loopback
+no_loopback
 words="$("$starloop" links)"
 grep -q 'v4l2 *no: sudo modprobe v4l2loopback' <<<"$words" || fail "links says: $words"
 status=0
