@@ -3,6 +3,7 @@ source="$1" build="$2" kernel="$3"
 shift 3
 export PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LC_ALL=C source build
 exec </dev/null
+: >/mnt/booted
 
 busybox ip link set lo up
 mkdir -p /dev/shm /dev/pts /run

@@ -3,8 +3,8 @@
 #   run.sh BUILD RESULTS SCRIPT [WORD...]
 # BUILD is a build tree whose programs are driven; RESULTS, emptied first, gets what the script writes to
 # /mnt, and the console. STARLOOP_GUEST_CACHE: where the kernel is kept, else BUILD/guest/kernel.
-# STARLOOP_GUEST_SECONDS: how long it may take. Exit code: that of the script; 77 skipped, 98 the guest
-# did not come to its end by itself, 99 it hung.
+# STARLOOP_GUEST_SECONDS: how long it may take. Exit code: that of the script; 77 skipped (something is
+# missing, or the kernel does not come up), 98 the guest did not come to its end by itself, 99 it hung.
 set -euo pipefail
 here="$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)"
 build="$(cd "$1" && pwd)"
@@ -40,6 +40,13 @@ timeout -k 5 "$limit" qemu-system-x86_64 -machine q35 -accel tcg,thread=multi -c
   -device virtio-9p-pci,fsdev=host,mount_tag=host \
   -fsdev "local,id=out,path=$results,security_model=none" \
   -device virtio-9p-pci,fsdev=out,mount_tag=out </dev/null || status=$?
+# A kernel that does not come up here says nothing about the programs.
+if [[ ! -e "$results/booted" ]]; then
+  tail -20 "$results/console"
+  echo "SKIPPED: QEMU does not bring Debian's kernel up on this machine (exit code $status after" \
+    "$((SECONDS - started)) s); its console is above" | tee "$results/skipped"
+  exit 77
+fi
 if (( status == 124 || status == 137 )); then
   tail -20 "$results/console"
   echo "the guest hung: it was not done after $limit s; the end of its console is above"

@@ -1,4 +1,4 @@
-# The cable pulled and put back in the middle of the stream, twenty times: frames go on each time.
+# The cable pulled and put back in the middle of the stream, six times: frames go on each time.
 # Limit: 150 s
 . "$source/tests/guest/gadget_lib.sh"
 controller is_super_speed=1
@@ -7,7 +7,7 @@ client 256
 pattern run --set link.to=usb --set camera.width_px=256 --set camera.height_px=256
 run=$!
 within 60 frames_above 3
-for i in $(seq 20); do
+for i in $(seq 6); do
   echo '' >"$gadgets/starloop/UDC"
   # Every second time it is back before anybody may have looked.
   if (( i % 2 == 0 )); then within 10 unplugged; fi
@@ -17,6 +17,6 @@ done
 stop_run run "$run"
 all_right
 tail -1 client.out
-(( $(report run links.0.usb.connections) >= 20 )) || fail "$(report run links)"
+(( $(report run links.0.usb.connections) >= 6 )) || fail "$(report run links)"
 end_device
-grep '^2. connections' gadget.out || fail "$(cat gadget.out)"
+grep '^[67] connections' gadget.out || fail "$(cat gadget.out)"
