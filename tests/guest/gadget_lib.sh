@@ -4,6 +4,9 @@ export STARLOOP_CLIENT_LIBRARY="$build/drivers/client/libstarloop_client.so.0"
 program="$build/starloop_usb_device"
 gadgets=/sys/kernel/config/usb_gadget
 udc=dummy_udc.0
+# Not that of the device over USB/IP, which others have plugged in at the same time.
+product=00f5
+gadget_link=link.to=usb:1209:$product
 
 # A port and a host's socket that is its other end, in this machine: dummy_hcd, with these options.
 controller() {
@@ -11,20 +14,21 @@ controller() {
   modprobe dummy_hcd "$@"
   within 10 test -e "/sys/class/udc/$udc"
 }
-plugged() { grep -qx 1209 /sys/bus/usb/devices/*/idVendor; }
+plugged() { grep -qx $product /sys/bus/usb/devices/*/idProduct; }
+speed() { cat "$(dirname "$(grep -lx $product /sys/bus/usb/devices/*/idProduct)")/speed"; }
 unplugged() { ! plugged; }
 ended() { ! kill -0 "$1"; }
 
 # The device for frames of so many pixels each way, and software under test that judges them.
 device() {
-  beside gadget sh "$source/tools/usb_device/gadget.sh" --program "$program" -- \
-    --shm cam0 --width "$1" --height "$1"
+  beside gadget sh "$source/tools/usb_device/gadget.sh" --program "$program" --product 0x$product -- \
+    --shm board0 --width "$1" --height "$1"
   gadget=$!
   within 30 grep -q "on $udc" gadget.out
   within 30 plugged
 }
 client() {
-  beside client /usr/bin/python3 -u "$source/tests/guest/gadget_client.py" cam0 "$1" "$1"
+  beside client /usr/bin/python3 -u "$source/tests/guest/gadget_client.py" board0 "$1" "$1"
   client=$!
 }
 # What the client has seen so far: a number of its last line.
@@ -47,7 +51,7 @@ end_device() {
 nothing_left() {
   [[ -z "$(ls "$gadgets")" ]] || fail "gadgets are left: $(find "$gadgets" -maxdepth 2)"
   if grep -q functionfs /proc/mounts; then fail "functionfs is left mounted"; fi
-  if pgrep -x starloop_usb_de; then fail "the program is left"; fi
+  if pgrep -f "^$program --gadget"; then fail "the program is left"; fi
   [[ ! -e /run/starloop-gadget-starloop ]] || fail "its folder is left"
 }
 # Words of a command that fails with this exit code.

@@ -24,10 +24,18 @@ run_check() {
   took=$((($(date +%s%N) - began) / 100000000))
   echo "$rc $((took / 10)).$((took % 10))" >"/mnt/$check.rc"
 }
-# One after the other of those that share a driver: v4l2_*, and the others.
-lane_of_v4l2() { for check in "${checks[@]}"; do [[ "$check" != v4l2_* ]] || run_check "$check"; done; }
-lane_of_others() { for check in "${checks[@]}"; do [[ "$check" == v4l2_* ]] || run_check "$check"; done; }
-lane_of_v4l2 &
-lane_of_others &
+# One after the other of those that share a driver: v4l2_*, gadget_*, and those over USB/IP.
+lane() {
+  local check
+  for check in "${checks[@]}"; do
+    case "$check" in
+      v4l2_*) [[ "$1" == v4l2 ]] || continue ;;
+      gadget_*) [[ "$1" == gadget ]] || continue ;;
+      *) [[ "$1" == others ]] || continue ;;
+    esac
+    run_check "$check"
+  done
+}
+for name in v4l2 gadget others; do lane $name & done
 wait
 switch_off 0

@@ -13,7 +13,7 @@ refused 3 setpriv --reuid 65534 --clear-groups sh "$script" --program "$program"
 says "only root"
 nothing_left
 # The program alone, where nothing is mounted; and one that cannot start ends the script.
-refused 3 "$program" --gadget "$scratch" --shm cam0
+refused 3 "$program" --gadget "$scratch" --shm board0
 says "modprobe usb_f_fs"
 refused 3 sh "$script" --program "$program" -- --shm /a/b
 nothing_left

@@ -4,7 +4,7 @@
 controller is_super_speed=1
 device 256
 client 256
-pattern run --set link.to=usb --set camera.width_px=256 --set camera.height_px=256
+pattern run --set $gadget_link --set camera.width_px=256 --set camera.height_px=256
 run=$!
 within 60 frames_above 3
 for i in $(seq 6); do

@@ -5,7 +5,7 @@
 controller is_super_speed=1
 device 256
 client 256
-pattern run --set link.to=usb --set camera.width_px=256 --set camera.height_px=256
+pattern run --set $gadget_link --set camera.width_px=256 --set camera.height_px=256
 run=$!
 within 60 frames_above 3
 for i in 1 2; do
@@ -18,7 +18,7 @@ for i in 1 2; do
   goes_on 3
 done
 # A second one is told that there is one.
-refused 3 sh "$source/tools/usb_device/gadget.sh" --program "$program" -- --shm cam1
+refused 3 sh "$source/tools/usb_device/gadget.sh" --program "$program" -- --shm board1
 says "is there already"
 goes_on 3
 kill -KILL "$gadget"

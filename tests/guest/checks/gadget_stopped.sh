@@ -5,10 +5,10 @@
 controller is_super_speed=1
 device 1024
 client 1024
-pattern run --set link.to=usb --set link.usb_packed=false --set run.frame_rate_hz=2
+pattern run --set $gadget_link --set link.usb_packed=false --set run.frame_rate_hz=2
 run=$!
 within 60 frames_above 1
-for i in 1 2 3 4; do
+for i in 1 2; do
   program_id="$(cat /run/starloop-gadget-starloop/program)"
   kill -STOP "$program_id"
   sleep 1.3

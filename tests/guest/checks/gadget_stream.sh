@@ -5,9 +5,9 @@ stream() {
   local name="$1" size="$2" frames="$3" speed="$4"
   shift 4
   device "$size"
-  [[ "$(cat /sys/bus/usb/devices/*-1/speed)" == "$speed" ]] || fail "speed of $name"
+  [[ "$(speed)" == "$speed" ]] || fail "speed of $name"
   client "$size"
-  pattern "$name" --set link.to=usb --set run.clock=as-fast-as-possible \
+  pattern "$name" --set $gadget_link --set run.clock=as-fast-as-possible \
     --set camera.width_px="$size" --set camera.height_px="$size" "$@"
   local run=$! began commands
   within 60 frames_above 2
@@ -39,7 +39,6 @@ stream() {
 controller is_super_speed=1
 stream super-packed 1024 20 5000
 stream super-plain 1024 20 5000 --set link.usb_packed=false
-stream super-small 256 20 5000 --set link.telemetry_row=false
 controller is_super_speed=0
 stream high-packed 1024 10 480
 # Trims are two whole packets of 64 bytes each.

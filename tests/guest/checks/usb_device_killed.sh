@@ -4,7 +4,7 @@ size=(--width 256 --height 256)
 device cam "${size[@]}"
 attach
 beside client "$build/tests/guest/guest_client" cam 256 256
-pattern run --set run.frame_rate_hz=10 --set camera.width_px=256 --set camera.height_px=256 --set link.to=usb
+pattern run --set run.frame_rate_hz=10 --set camera.width_px=256 --set camera.height_px=256 --set link.to=usb:1209:0001
 run=$!
 within 120 has_count client frames 5
 kill -9 $device_pid

@@ -8,7 +8,7 @@ within 60 "$starloop" links
 for packed in true false; do
   beside client-$packed "$build/tests/guest/guest_client" cam 1024 1024
   client=$!
-  pattern run-$packed --set run.clock=as-fast-as-possible --set run.duration_s=1.4 --set link.to=usb --set link.usb_packed=$packed
+  pattern run-$packed --set run.clock=as-fast-as-possible --set run.duration_s=1.4 --set link.to=usb:1209:0001 --set link.usb_packed=$packed
   joined run-$packed $!
   read -r sent due good < <(report run-$packed frames.sent frames.due links.0.usb.device.good)
   equal "sent" "$sent" "$due"
