@@ -99,8 +99,14 @@ void list_usb() {
     line("usb", std::string("no: ") + e.what());
     return;
   }
-  if (!any)
-    line("usb", "no: no device with the interface of drivers/usb_protocol.md is plugged in");
+  if (any) return;
+  line("usb", "no: no device with the interface of drivers/usb_protocol.md is plugged in");
+  // The device in software, which this kernel would attach.
+  const bool can_attach = loaded("vhci_hcd") || installed("vhci-hcd");
+  line("usb", can_attach ? "without the board: starloop_usb_device, sudo modprobe vhci-hcd, sudo "
+                           "usbip attach -r HOST -b 1-1 (docs/links.md)"
+                         : "without the board: this kernel has no vhci-hcd to attach "
+                           "starloop_usb_device with");
 }
 
 }  // namespace
