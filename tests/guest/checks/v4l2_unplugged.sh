@@ -21,10 +21,10 @@ no_node() { ! has_node; }
 within 60 no_node
 echo vivid.0 >$driver/bind
 within 60 has_node
-sleep 3
+sleep 6
 stop_run run $run
 read -r sent refused < <(report run frames.sent frames.faults)
 echo "$sent sent, $refused refused while the node was away"
-# Ten or so were before; three seconds were after.
+# Ten or so were before; six seconds were after.
 (( sent >= 20 && refused > 0 )) || fail "nothing was sent after the node came back, or nothing refused"
 rmmod vivid
