@@ -20,8 +20,8 @@ export ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=print_stacktrace=1
 export TSAN_OPTIONS="suppressions=$PWD/tests/tsan_suppressions.txt"
 # Whatever has threads; the rest would only take longer.
 threaded='FrameLoop|Lockstep|LoopGate|TriggeredLoop|LateFrames|LoopLatency|SpscRing|WorkerPool'
-threaded+='|MockLink|Shm|Usb|CommandPort|MergedCommands|Recorder|HiccupMeter|RunTimeMeter|Faults|FaultyLoop|ImagingChain'
-threaded+='|Tracker|ForeignProcess|StarloopSoak'
+threaded+='|MockLink|Shm|Usb|Function|HandOver|CommandPort|MergedCommands|Recorder|HiccupMeter'
+threaded+='|RunTimeMeter|Faults|FaultyLoop|ImagingChain|Tracker|ForeignProcess|StarloopSoak'
 
 if [[ "$full" == yes ]]; then
   tools/setup.sh --full
