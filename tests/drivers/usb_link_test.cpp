@@ -89,6 +89,8 @@ TEST_F(UsbLinkTest, CommandsComeBackInOrderAndWrongMessagesAreCounted) {
   device_.plug();
   UsbLink link = make_link();
   ASSERT_TRUE(send(link, 1).ok());
+  // What the device said before the session began may be one already.
+  const std::uint64_t before = link.counts().bad_messages;
   device_.say(std::vector<std::byte>(40, std::byte{0x55}));
   device_.with([](drivers::FrameIntake& intake) {
     for (std::uint64_t k = 1; k <= 10; ++k) ASSERT_TRUE(intake.command(command_bytes(k)));
@@ -102,7 +104,7 @@ TEST_F(UsbLinkTest, CommandsComeBackInOrderAndWrongMessagesAreCounted) {
   }
   EXPECT_EQ(link.receive(kPatient).error().fault, Fault::kRejected);
   EXPECT_EQ(link.receive(Duration{}).error().fault, Fault::kTimeout);
-  EXPECT_EQ(link.counts().bad_messages, 1U);
+  EXPECT_EQ(link.counts().bad_messages, before + 1);
 }
 
 TEST_F(UsbLinkTest, WithoutACreditNothingIsSentAndTheSenderIsBusy) {
