@@ -1,79 +1,58 @@
-#include <initializer_list>
-#include <string_view>
-
 #include <linux/usb/ch9.h>
 #include <linux/usb/functionfs.h>
 
 #include "drivers/usb_device/function_files.h"
+#include "drivers/usb_device/usb_descriptors.h"
 #include "drivers/usb_packet.h"
 
 namespace drivers {
 namespace {
 
-using Bytes = std::vector<std::byte>;
-
-void append(Bytes& out, std::initializer_list<unsigned> values) {
-  for (const unsigned v : values) out.push_back(static_cast<std::byte>(v));
-}
-void append_word(Bytes& out, std::uint32_t word) {
-  append(out, {word & 0xFF, word >> 8 & 0xFF, word >> 16 & 0xFF, word >> 24});
-}
-/// All lengths of these files are at byte 4.
-void set_length(Bytes& out) {
-  Bytes length;
-  append_word(length, static_cast<std::uint32_t>(out.size()));
-  std::copy(length.begin(), length.end(), out.begin() + 4);
-}
-
-void append_endpoint(Bytes& out, unsigned address, unsigned packet) {
-  append(out, {USB_DT_ENDPOINT_SIZE, USB_DT_ENDPOINT, address, USB_ENDPOINT_XFER_BULK,
-               packet & 0xFF, packet >> 8, 0});
-}
+// Both files begin with a magic number and their length.
+constexpr std::size_t kLengthAt = 4;
 
 /// `most_burst`: packets more that the host may send without waiting; below 0: none of super
 /// speed's companions.
-void append_speed(Bytes& out, unsigned packet, int most_burst) {
+void add_speed(DescriptorWriter& out, std::size_t packet, int most_burst) {
   constexpr unsigned kFirstString = 1;
   constexpr unsigned kOut = 0x01;
-  constexpr unsigned kIn = 0x82;
-  append(out, {USB_DT_INTERFACE_SIZE, USB_DT_INTERFACE, 0, 0, 2, kUsbClass, kUsbSubclass,
-               kUsbProtocol, kFirstString});
-  append_endpoint(out, kOut, packet);
-  if (most_burst >= 0)
-    append(out, {USB_DT_SS_EP_COMP_SIZE, USB_DT_SS_ENDPOINT_COMP, static_cast<unsigned>(most_burst),
-                 0, 0, 0});
-  append_endpoint(out, kIn, packet);
-  // Messages are single packets.
-  if (most_burst >= 0) append(out, {USB_DT_SS_EP_COMP_SIZE, USB_DT_SS_ENDPOINT_COMP, 0, 0, 0, 0});
+  constexpr unsigned kIn = kUsbToHost | 0x02;
+  out.begin().bytes(
+      {kUsbInterfaceDescriptor, 0, 0, 2, kUsbClass, kUsbSubclass, kUsbProtocol, kFirstString});
+  for (const unsigned address : {kOut, kIn}) {
+    out.begin().bytes({kUsbEndpointDescriptor, address, USB_ENDPOINT_XFER_BULK});
+    out.half(static_cast<unsigned>(packet)).bytes({0});
+    if (most_burst < 0) continue;
+    // Messages are single packets.
+    const unsigned burst = address == kOut ? static_cast<unsigned>(most_burst) : 0;
+    out.begin().bytes({kUsbCompanionDescriptor, burst, 0, 0, 0});
+  }
 }
 
 }  // namespace
 
-Bytes function_descriptors() {
-  Bytes out;
-  append_word(out, FUNCTIONFS_DESCRIPTORS_MAGIC_V2);
-  append_word(out, 0);
-  append_word(out, FUNCTIONFS_HAS_FS_DESC | FUNCTIONFS_HAS_HS_DESC | FUNCTIONFS_HAS_SS_DESC);
-  for (const std::uint32_t descriptors : {3U, 3U, 5U}) append_word(out, descriptors);
-  append_speed(out, 64, -1);
-  append_speed(out, 512, -1);
-  append_speed(out, 1024, 15);
-  set_length(out);
-  return out;
+std::vector<std::byte> function_descriptors() {
+  constexpr int kSuperBurst = 15;
+  DescriptorWriter out;
+  out.word(FUNCTIONFS_DESCRIPTORS_MAGIC_V2).word(0);
+  out.word(FUNCTIONFS_HAS_FS_DESC | FUNCTIONFS_HAS_HS_DESC | FUNCTIONFS_HAS_SS_DESC);
+  out.word(3).word(3).word(5);  // descriptors of each
+  add_speed(out, 64, -1);
+  add_speed(out, kUsbPacketBytes, -1);
+  add_speed(out, kUsbSuperPacketBytes, kSuperBurst);
+  out.length_since(0, kLengthAt);
+  return out.finish();
 }
 
-Bytes function_strings() {
+std::vector<std::byte> function_strings() {
   constexpr unsigned kEnglish = 0x0409;
-  constexpr std::string_view kName = "Starloop frame injection";
-  Bytes out;
-  append_word(out, FUNCTIONFS_STRINGS_MAGIC);
-  append_word(out, 0);
-  for (const std::uint32_t count : {1U, 1U}) append_word(out, count);  // strings, languages
-  append(out, {kEnglish & 0xFF, kEnglish >> 8});
-  for (const char c : kName) out.push_back(static_cast<std::byte>(c));
-  out.push_back(std::byte{0});
-  set_length(out);
-  return out;
+  DescriptorWriter out;
+  out.word(FUNCTIONFS_STRINGS_MAGIC).word(0);
+  out.word(1).word(1).half(kEnglish);  // strings, languages, and which
+  // With the zero at its end.
+  for (const char c : "Starloop frame injection") out.bytes({static_cast<unsigned char>(c)});
+  out.length_since(0, kLengthAt);
+  return out.finish();
 }
 
 }  // namespace drivers

@@ -27,11 +27,6 @@ DescriptorWriter& DescriptorWriter::word(std::uint32_t value) {
   return half(value & 0xFFFF).half(value >> 16);
 }
 
-DescriptorWriter& DescriptorWriter::raw(const std::vector<std::byte>& more) {
-  out_.insert(out_.end(), more.begin(), more.end());
-  return *this;
-}
-
 std::size_t DescriptorWriter::later() {
   half(0);
   return out_.size() - 2;

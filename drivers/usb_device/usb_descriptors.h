@@ -32,7 +32,6 @@ class DescriptorWriter {
   DescriptorWriter& bytes(std::initializer_list<unsigned> values);
   DescriptorWriter& half(unsigned value);
   DescriptorWriter& word(std::uint32_t value);
-  DescriptorWriter& raw(const std::vector<std::byte>& more);
   /// Two bytes that say how long something is, once it is whole: where they are.
   [[nodiscard]] std::size_t later();
   void length_since(std::size_t start, std::size_t at);

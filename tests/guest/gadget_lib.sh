@@ -35,6 +35,15 @@ client() {
 seen() { tail -1 client.out | tr ' ' '\n' | sed -n "s/^$1=//p" | grep . || echo 0; }
 frames_above() { (( $(seen frames) > $1 )); }
 goes_on() { within 60 frames_above "$(($(seen frames) + $1))"; }
+# A run of small frames, as $run, to the device and its software, at super speed.
+small_stream() {
+  controller is_super_speed=1
+  device 256
+  client 256
+  pattern run --set $gadget_link --set camera.width_px=256 --set camera.height_px=256
+  run=$!
+  within 60 frames_above 3
+}
 # Every frame that came was one that went out, bit for bit, and none came twice.
 all_right() {
   (( $(seen frames) > 0 )) || fail "no frame"
@@ -51,7 +60,8 @@ end_device() {
 nothing_left() {
   [[ -z "$(ls "$gadgets")" ]] || fail "gadgets are left: $(find "$gadgets" -maxdepth 2)"
   if grep -q functionfs /proc/mounts; then fail "functionfs is left mounted"; fi
-  if pgrep -f "^$program --gadget"; then fail "the program is left"; fi
+  # By its option, whole; the pattern is not itself one.
+  if grep -zlsx -e '--gadge[t]' /proc/[0-9]*/cmdline; then fail "the program is left"; fi
   [[ ! -e /run/starloop-gadget-starloop ]] || fail "its folder is left"
 }
 # Words of a command that fails with this exit code.
