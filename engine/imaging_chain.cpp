@@ -47,6 +47,7 @@ ImagingChain::ImagingChain(const SnapshotBuilder& scene, std::unique_ptr<Rendere
   const GridWish wish = optics_.wish();
   const PixelRect most = camera.frame().grown_by(wish.beyond_frame_px);
   radiance_.grid.reserve(most.width() * wish.oversampling, most.height() * wish.oversampling);
+  radiance_.cover.reserve(most.width() * wish.oversampling, most.height() * wish.oversampling);
 }
 
 FrameReport ImagingChain::expose(const Shot& shot, Budget budget, DnImage& out,

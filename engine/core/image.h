@@ -13,6 +13,9 @@ namespace engine {
 struct RadianceQuantity {
   using Value = float;  ///< W/m^2/sr, in band
 };
+struct CoverQuantity {
+  using Value = float;  ///< share of the area that the target covers, in [0, 1]
+};
 struct IrradianceQuantity {
   using Value = float;  ///< W/m^2 on the detector, mean over the pixel's area
 };
@@ -68,6 +71,7 @@ class Image {
 };
 
 using RadianceImage = Image<RadianceQuantity>;
+using CoverImage = Image<CoverQuantity>;
 using IrradianceImage = Image<IrradianceQuantity>;
 using ElectronImage = Image<ElectronQuantity>;
 using DnImage = Image<DnQuantity>;

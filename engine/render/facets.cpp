@@ -117,12 +117,20 @@ void Facets::light_facet(const Snapshot& snapshot, std::size_t index) noexcept {
 
 SurfacePoint Facets::at(const MeshHit& hit, const Vector3f& direction) const noexcept {
   const Facet& facet = facets_[hit.triangle];
-  SurfacePoint point;
-  point.place = facet.corner + hit.second * facet.edge1 + hit.third * facet.edge2;
-  point.normal = facet.normal.dot(direction) > 0.0F ? Vector3f(-facet.normal) : facet.normal;
-  point.material = facet.material;
-  point.offset_m = facet.offset_m;
-  return point;
+  return facet.seen_along(direction,
+                          facet.corner + hit.second * facet.edge1 + hit.third * facet.edge2);
+}
+
+SurfacePoint Facets::on_plane(std::uint32_t triangle, const Vector3f& start,
+                              const Vector3f& direction) const noexcept {
+  const Facet& facet = facets_[triangle];
+  const float along = facet.normal.dot(facet.corner - start) / facet.normal.dot(direction);
+  return facet.seen_along(direction, start + along * direction);
+}
+
+SurfacePoint Facets::Facet::seen_along(const Vector3f& direction,
+                                       const Vector3f& place) const noexcept {
+  return {place, normal.dot(direction) > 0.0F ? Vector3f(-normal) : normal, material, offset_m};
 }
 
 }  // namespace engine

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <vector>
 
 #include "engine/core/worker_pool.h"
@@ -54,6 +56,26 @@ class Facets {
   /// The place of a hit; the normal on the side that `direction` comes from.
   [[nodiscard]] SurfacePoint at(const MeshHit& hit,
                                 const Eigen::Vector3f& direction) const noexcept;
+  /// Where the line from `start` along `direction` meets the plane of facet `triangle`.
+  [[nodiscard]] SurfacePoint on_plane(std::uint32_t triangle, const Eigen::Vector3f& start,
+                                      const Eigen::Vector3f& direction) const noexcept;
+  /// A place on side 0, which the normal leaves, or 1.
+  [[nodiscard]] SurfacePoint on_side(std::uint32_t triangle, float second, float third,
+                                     unsigned side) const noexcept {
+    const Facet& f = facets_[triangle];
+    return {f.corner + second * f.edge1 + third * f.edge2,
+            side == 0 ? f.normal : Eigen::Vector3f(-f.normal), f.material, f.offset_m};
+  }
+  /// The side that is seen along `direction`.
+  [[nodiscard]] unsigned side_seen(std::uint32_t triangle,
+                                   const Eigen::Vector3f& direction) const noexcept {
+    return facets_[triangle].normal.dot(direction) > 0.0F ? 1 : 0;
+  }
+  [[nodiscard]] float longest_edge_m(std::uint32_t triangle) const noexcept {
+    const Facet& f = facets_[triangle];
+    return std::sqrt(std::max(
+        {f.edge1.squaredNorm(), f.edge2.squaredNorm(), (f.edge2 - f.edge1).squaredNorm()}));
+  }
   [[nodiscard]] const Brdf& brdf(std::uint32_t material) const noexcept { return brdfs_[material]; }
 
  private:
@@ -66,6 +88,9 @@ class Facets {
     std::uint32_t material = 0;
     CornerNormals normals;  ///< of the smooth surface
     float spread_rad = 0;   ///< of these, from the facet's own
+
+    [[nodiscard]] SurfacePoint seen_along(const Eigen::Vector3f& direction,
+                                          const Eigen::Vector3f& place) const noexcept;
   };
   [[nodiscard]] double reflected(const Facet& facet, double side, const Eigen::Vector3d& to_lamp,
                                  const Eigen::Vector3d& to_camera) const noexcept;

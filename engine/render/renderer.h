@@ -22,6 +22,7 @@ struct Radiance {
   PixelRect region;  ///< may reach beyond the frame: light from there blurs in
   int oversampling = 3;
   RadianceImage grid;
+  CoverImage cover;  ///< of the same cells: what lies behind them shows through the rest
   std::vector<PointSource> points;  ///< inside the region
   double uniform_w_m2_sr = 0;
   PixelPoint motion_px;  ///< how the image moves from shutter open to shutter close

@@ -6,7 +6,8 @@
 
 #include <gtest/gtest.h>
 
-#include "engine/render/path_tracer.h"
+#include "engine/render/render_spec.h"
+#include "engine/render/traced_target.h"
 #include "engine/scene/telescope.h"
 #include "tests/support/scenes.h"
 
@@ -38,9 +39,9 @@ class Rig {
     RenderSpec render;
     render.camera = scene.camera;
     render.grid = optics.wish();
-    auto tracer = std::make_unique<PathTracer>(render, mesh, materials, pool_);
+    auto renderer = make_renderer(render, std::make_shared<TracedTarget>(mesh, materials), pool_);
     chain_ = std::make_unique<ImagingChain>(SnapshotBuilder(scene, flyby.camera, flyby.target),
-                                            std::move(tracer), std::move(optics),
+                                            std::move(renderer), std::move(optics),
                                             Detector(detector, pool_), detector, scene.camera);
   }
 

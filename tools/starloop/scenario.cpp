@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "engine/orbit/utc.h"
+#include "engine/render/traced_target.h"
 #include "engine/scene/telescope.h"
 #include "hil/steady_clock.h"
 #include "hil/telemetry_row.h"
@@ -205,16 +206,16 @@ Rig::Rig(const Scenario& scenario, int threads)
   render.grid = optics.wish();
   engine::Mesh mesh = load_mesh(scenario);
   triangles_ = mesh.triangles.size();
-  std::unique_ptr<engine::PathTracer> tracer;
+  std::shared_ptr<engine::TracedTarget> target;
   try {
-    tracer =
-        std::make_unique<engine::PathTracer>(render, std::move(mesh), scenario.materials, pool_);
+    target = std::make_shared<engine::TracedTarget>(std::move(mesh), scenario.materials);
   } catch (const engine::ConfigError& e) {
     throw engine::ConfigError(scenario.mesh_where + ": " + e.what());
   }
   generator_ = std::make_unique<engine::ImagingChain>(
-      engine::SnapshotBuilder(scenario.scene, camera_, target_), std::move(tracer),
-      std::move(optics), engine::Detector(detector, pool_), detector, scenario.scene.camera,
+      engine::SnapshotBuilder(scenario.scene, camera_, target_),
+      engine::make_renderer(render, std::move(target), pool_), std::move(optics),
+      engine::Detector(detector, pool_), detector, scenario.scene.camera,
       &hil::SteadyClock::stopwatch);
 }
 

@@ -9,7 +9,7 @@
 #include "engine/imaging_chain.h"
 #include "engine/orbit/kepler.h"
 #include "engine/orbit/visibility.h"
-#include "engine/render/path_tracer.h"
+#include "engine/render/render_spec.h"
 #include "engine/scene/brdf.h"
 #include "hil/closed_loop_pointing.h"
 #include "hil/command_port.h"
