@@ -77,6 +77,22 @@ Optics::Optics(const OpticsSpec& spec, double faint_w_m2, WorkerPool& pool)
   folded_.resize(at(longest / kOversampling) * (at(longest / kOversampling) / 2 + 1));
 }
 
+double Optics::noise_blur_px() const noexcept {
+  constexpr int kSteps = 128;  // over a quarter of the plane; a thousandth off at 64
+  const double pitch_m = spec_.camera.pixel_pitch_m;
+  const double step = diffraction_.cutoff_per_m() * pitch_m / kSteps;  // cycles per pixel
+  double integral = 0;
+  for (int i = 0; i < kSteps; ++i) {
+    for (int k = 0; k < kSteps; ++k) {
+      const double fx = (i + 0.5) * step;
+      const double fy = (k + 0.5) * step;
+      const double otf = diffraction_.at(std::hypot(fx, fy) / pitch_m) * sinc(fx) * sinc(fy);
+      integral += 4.0 * step * step * otf * otf;
+    }
+  }
+  return std::sqrt(1.0 / (4.0 * kPi * integral));
+}
+
 /// Calls work(share, index) for every index in [0, count); a share never runs twice at once.
 template <class Work>
 void Optics::share(int count, const Work& work) noexcept {

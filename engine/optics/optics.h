@@ -43,6 +43,9 @@ class Optics {
   [[nodiscard]] GridWish wish() const noexcept { return {kOversampling, spec_.largest_wing_px}; }
   /// Irradiance on the detector for a radiance that is even over the field, in its unit per sr.
   [[nodiscard]] double throughput_sr() const noexcept { return throughput_sr_; }
+  /// rms, in pixels, of the Gaussian that averages noise of the radiance as this does, smear apart:
+  /// 1 / (4 pi sigma^2) is the integral of the squared OTF.
+  [[nodiscard]] double noise_blur_px() const noexcept;
 
   /// Overwrites `out`, of the camera's size. Pre: in.oversampling is wish().oversampling.
   OpticsReport project(const Radiance& in, IrradianceImage& out) noexcept;

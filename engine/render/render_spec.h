@@ -25,6 +25,7 @@ struct RenderSpec {
   int bounces = 1;             ///< indirect bounces; 0 leaves direct light alone
   CameraGeometry camera;
   GridWish grid;
+  SensorNoise noise;
 };
 [[nodiscard]] RenderSpec read_render(const ConfigTable& table);
 

@@ -1,6 +1,10 @@
 #pragma once
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstdint>
+#include <string_view>
 #include <vector>
 
 #include "engine/core/image.h"
@@ -34,9 +38,40 @@ struct GridWish {
   int beyond_frame_px = 64;  ///< how far outside the frame light still matters
 };
 
+/// The camera's own noise, by which a renderer judges its own (model.md's sigma).
+struct SensorNoise {
+  double e_per_radiance = 0;    ///< electrons in a pixel for an even 1 W/m^2/sr; 0: not known
+  double dark_variance_e2 = 0;  ///< of a pixel that no light falls on
+  double full_well_e = 0;
+  /// Of the Gaussian that averages noise as the spread of light does, rms.
+  double blur_px = 0;
+
+  /// rms, of a pixel that collects `mean_e` of light.
+  [[nodiscard]] double sigma_e(double mean_e) const noexcept {
+    return std::sqrt(std::max(mean_e, 0.0) + dark_variance_e2);
+  }
+};
+
 /// What a frame may cost. 0 leaves it to the renderer's own setting.
 struct Budget {
-  int samples_per_pixel = 0;
+  int samples_per_pixel = 0;  ///< so many in every pixel, whatever the noise
+  double rho_mc = 0;          ///< the largest Monte Carlo error after the optics, in sigmas
+};
+
+/// A step of a ladder that a frame took. Both names are of static storage.
+struct Rung {
+  std::string_view ladder;  ///< "bounces"
+  std::string_view taken;   ///< "1"
+  double error_e = 0;       ///< the largest that it accepts, in a pixel; not a number: not known
+};
+
+/// The Monte Carlo error of an image after the optics over the sensor's noise, by the pixels that
+/// see light; those at full well are counted apart.
+struct NoiseReached {
+  double rms = 0;
+  double worst = 0;
+  int lit_px = 0;
+  int clipped_px = 0;
 };
 
 /// What was reached.
@@ -51,6 +86,9 @@ struct RenderReport {
   /// outside. By area, each layer of surface for itself; the same as of the outline for a convex
   /// body.
   double visible_fraction = 0;
+  NoiseReached rho_mc;
+  static constexpr std::size_t kMostRungs = 8;
+  std::array<Rung, kMostRungs> rungs{};  ///< those with a name
 };
 
 /// Thread: loop; it owns its workers. Loop-safe: the scene is built in the constructor.

@@ -204,6 +204,9 @@ Rig::Rig(const Scenario& scenario, int threads)
   engine::Optics optics(scenario.optics, faint_w_m2, pool_);
   engine::RenderSpec render = scenario.render;
   render.grid = optics.wish();
+  const double noise_e = detector.noise_e(dark_e);
+  render.noise = {optics.throughput_sr() * detector.electrons_per_irradiance(scenario.run.exposure),
+                  noise_e * noise_e, detector.full_well_e, optics.noise_blur_px()};
   engine::Mesh mesh = load_mesh(scenario);
   triangles_ = mesh.triangles.size();
   std::shared_ptr<engine::TracedTarget> target;

@@ -331,6 +331,24 @@ TEST(Optics, EvenRadianceIsTheThroughput) {
   EXPECT_TRUE(std::ranges::all_of(out.pixels(), [want](float x) { return x == want; }));
 }
 
+TEST(Optics, AveragesNoiseOverTheSquaredSpreadOfAPoint) {
+  // The sum of the squared shares of a point that pixels get, averaged over its places in a pixel,
+  // is the integral of the squared OTF.
+  double squares = 0;
+  constexpr int kPlaces = 4;
+  for (int i = 0; i < kPlaces; ++i) {
+    for (int k = 0; k < kPlaces; ++k) {
+      const Projected out = project(point_at(256 + (i + 0.5) / kPlaces, 256 + (k + 0.5) / kPlaces));
+      for (const float x : out.image.pixels())
+        squares += std::pow(static_cast<double>(x) / flux_of_unit_point(), 2);
+    }
+  }
+  squares /= kPlaces * kPlaces;
+  WorkerPool pool(1);
+  const double blur_px = Optics(spec_of(), kFaint_w_m2, pool).noise_blur_px();
+  EXPECT_NEAR(1.0 / (4.0 * kPi * blur_px * blur_px) / squares, 1.0, 5e-3);
+}
+
 TEST(Optics, ObscurationTakesItsAreaFromTheThroughput) {
   OpticsSpec spec = spec_of();
   spec.band.obscuration = 0.3;
