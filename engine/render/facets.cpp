@@ -128,6 +128,15 @@ SurfacePoint Facets::on_plane(std::uint32_t triangle, const Vector3f& start,
   return facet.seen_along(direction, start + along * direction);
 }
 
+std::array<float, 2> Facets::weights_at(std::uint32_t triangle,
+                                        const Vector3f& place) const noexcept {
+  const Facet& facet = facets_[triangle];
+  const Vector3f from_corner = place - facet.corner;
+  const float scale = 1.0F / facet.edge1.cross(facet.edge2).dot(facet.normal);
+  return {scale * from_corner.cross(facet.edge2).dot(facet.normal),
+          scale * facet.edge1.cross(from_corner).dot(facet.normal)};
+}
+
 SurfacePoint Facets::Facet::seen_along(const Vector3f& direction,
                                        const Vector3f& place) const noexcept {
   return {place, normal.dot(direction) > 0.0F ? Vector3f(-normal) : normal, material, offset_m};

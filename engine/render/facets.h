@@ -66,15 +66,12 @@ class Facets {
     return {f.corner + second * f.edge1 + third * f.edge2,
             side == 0 ? f.normal : Eigen::Vector3f(-f.normal), f.material, f.offset_m};
   }
-  /// The side that is seen along `direction`.
-  [[nodiscard]] unsigned side_seen(std::uint32_t triangle,
-                                   const Eigen::Vector3f& direction) const noexcept {
-    return facets_[triangle].normal.dot(direction) > 0.0F ? 1 : 0;
-  }
-  [[nodiscard]] float longest_edge_m(std::uint32_t triangle) const noexcept {
+  /// Of the second and third corner, for a place on the plane of facet `triangle`.
+  [[nodiscard]] std::array<float, 2> weights_at(std::uint32_t triangle,
+                                                const Eigen::Vector3f& place) const noexcept;
+  [[nodiscard]] double area_m2(std::uint32_t triangle) const noexcept {
     const Facet& f = facets_[triangle];
-    return std::sqrt(std::max(
-        {f.edge1.squaredNorm(), f.edge2.squaredNorm(), (f.edge2 - f.edge1).squaredNorm()}));
+    return 0.5 * f.edge1.cast<double>().cross(f.edge2.cast<double>()).norm();
   }
   [[nodiscard]] const Brdf& brdf(std::uint32_t material) const noexcept { return brdfs_[material]; }
 

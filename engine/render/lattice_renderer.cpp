@@ -6,20 +6,22 @@
 
 namespace engine {
 
-using Eigen::Matrix3d;
-using Eigen::Vector3d;
+using Eigen::Vector2f;
 using Eigen::Vector3f;
 
 namespace {
 
-// In each four points of a row one asks for the lamps; over four rows, each column once.
+// In each four points of a row one asks for the Sun; over four rows, each column once.
 constexpr int kAskEvery = 4;
 constexpr std::array<int, kAskEvery> kAsks = {0, 2, 1, 3};
 constexpr bool asks_first(int x, int y) noexcept {
   return x % kAskEvery == kAsks[static_cast<std::size_t>(y % kAskEvery)];
 }
-// The nearest a target may be, in its own radii from its centre.
-constexpr double kNearest = 2.0;
+constexpr int kTries = 16;
+// Of a cell's points of one facet: so few are asked at once.
+constexpr int kFewPoints = 6;
+
+std::size_t at(int i) noexcept { return static_cast<std::size_t>(i); }
 
 }  // namespace
 
@@ -27,42 +29,45 @@ LatticeRenderer::LatticeRenderer(const RenderSpec& spec, std::shared_ptr<TracedT
                                  WorkerPool& pool)
     : spec_(spec),
       target_(std::move(target)),
-      bounced_(*target_, spec.bounces),
+      view_(spec, target_),
+      sun_view_(target_->mesh),
+      body_light_(*target_, spec.bounces, pool),
+      bounced_paths_(*target_, spec.bounces),
+      bounced_(*target_, body_light_.patches()),
       paths_(spec, target_, pool),
-      footprint_(spec.camera, spec.grid.beyond_frame_px, target_->mesh.vertices.size()),
-      raster_(target_->mesh.vertices.size(), target_->mesh.triangles.size(),
-              spec.camera.frame().grown_by(spec.grid.beyond_frame_px).height()),
-      pool_(pool),
-      corners_(target_->mesh.vertices.size()) {
+      pool_(pool) {
   const PixelRect all = spec.camera.frame().grown_by(spec.grid.beyond_frame_px);
-  row_counts_.resize(static_cast<std::size_t>(all.height()));
+  row_counts_.resize(at(all.height()));
   const int s = spec.grid.oversampling;
   const int per_px = s * spec.lattice_side;
-  ENSURE(per_px <= TriangleRaster::kMostBandRows && spec.lattice_side % kAskEvery == 0);
-  const auto cells = static_cast<std::size_t>(all.width() * s);
-  const std::size_t points =
-      static_cast<std::size_t>(all.width() * per_px + TriangleRaster::kLanes) *
-      static_cast<std::size_t>(per_px);
+  ENSURE(per_px <= TriangleRaster::kMostBandRows && at(s * s) <= kMostCells);
+  const std::size_t points = at(all.width() * per_px + TriangleRaster::kLanes) * at(per_px);
   for (int i = 0; i < pool.threads(); ++i) {
     benches_.push_back(std::make_unique<Bench>());
     Bench& bench = *benches_.back();
     bench.seen.resize(points);
     bench.nearness.resize(points);
-    bench.shares.reserve(cells * static_cast<std::size_t>(spec.lattice_side * spec.lattice_side));
-    bench.cells.resize(cells);
+    bench.tones.reserve(at(per_px * per_px));
+    bench.doubts.reserve(points);
+    bench.mirrors.reserve(points);
   }
+}
+
+/// There is one for each thread of the pool.
+LatticeRenderer::Bench& LatticeRenderer::take_bench() noexcept {
+  for (std::size_t i = 0;; i = (i + 1) % benches_.size())
+    if (!benches_[i]->taken.exchange(true, std::memory_order_acquire)) return *benches_[i];
 }
 
 RenderReport LatticeRenderer::render(const Snapshot& snapshot, Budget budget,
                                      Radiance& out) noexcept {
   const int s = spec_.grid.oversampling;
-  footprint_.project(target_->mesh, snapshot);
-  const PixelRect region = footprint_.region();
-  side_ = budget.samples_per_pixel > 0 && budget.samples_per_pixel <= s * s * kAskEvery * kAskEvery
-              ? kAskEvery
-              : spec_.lattice_side;
-  if (!place(snapshot, region, side_)) return paths_.render(snapshot, budget, out);
+  int side = spec_.lattice_side;
+  while (side > 2 && budget.samples_per_pixel > 0 && side * side * s * s > budget.samples_per_pixel)
+    side /= 2;
+  if (!view_.place(snapshot, side)) return paths_.render(snapshot, budget, out);
 
+  const PixelRect region = view_.region();
   out.region = region;
   out.oversampling = s;
   out.uniform_w_m2_sr = snapshot.background_w_m2_sr;
@@ -71,16 +76,14 @@ RenderReport LatticeRenderer::render(const Snapshot& snapshot, Budget budget,
   out.grid.resize(region.width() * s, region.height() * s);
   out.cover.resize(out.grid.width(), out.grid.height());
   RenderReport report;
-  report.samples_per_pixel = s * s * side_ * side_;
+  report.samples_per_pixel = s * s * side * side;
   report.bounces = spec_.bounces;
-  report.visible_fraction = footprint_.visible_fraction();
+  report.visible_fraction = view_.footprint().visible_fraction();
   if (region.empty()) return report;
-  const auto lamps = lamps_of(snapshot);
-  for (std::size_t k = 0; k < kLamps; ++k) toward_lamp_[k] = lamps[k]->toward.unit.cast<float>();
-  target_->facets.light_up(snapshot, pool_);
-  pool_.rows(0, region.height(), [&](int row) { shade_pixel_row(snapshot, out, row); });
+  light_up(snapshot);
+  pool_.rows(0, region.height(), [&](int row) { shade_row(snapshot, out, row); });
   for (int row = 0; row < region.height(); ++row) {
-    const RowCounts& counts = row_counts_[static_cast<std::size_t>(row)];
+    const RowCounts& counts = row_counts_[at(row)];
     report.hits += counts.hits;
     report.rays += counts.rays.rays;
     report.rejected_rays += counts.rays.rejected;
@@ -91,226 +94,324 @@ RenderReport LatticeRenderer::render(const Snapshot& snapshot, Budget budget,
   return report;
 }
 
-/// False: the path tracer's.
-bool LatticeRenderer::place(const Snapshot& snapshot, const PixelRect& region, int side) noexcept {
-  const double range_m = snapshot.camera.m.norm();
-  // Not a number either.
-  if (!(range_m > kNearest * target_->bounding_radius_m)) return false;
-  const int per_px = spec_.grid.oversampling * side;
-  const Matrix3d& axes = snapshot.body_from_camera.matrix;
-  const Matrix3d camera_from_body = axes.transpose();
-  for (std::size_t i = 0; i < corners_.size(); ++i) {
-    const Vector3d p =
-        camera_from_body * (target_->mesh.vertices[i].cast<double>() - snapshot.camera.m);
-    const auto at = spec_.camera.project(p);
-    if (!at) return false;
-    // 1/z is linear on the detector; from the target's centre and in its radii it keeps its digits.
-    corners_[i] = {(at->u + 0.5 - region.left) * per_px, (at->v + 0.5 - region.top) * per_px,
-                   (range_m - p.z()) / p.z() * (range_m / target_->bounding_radius_m)};
-  }
-  if (!raster_.place(target_->mesh, corners_, region.width() * per_px, region.height() * per_px,
-                     per_px))
-    return false;
-  const double step_rad = spec_.camera.ifov_rad() / per_px;
-  const Vector3d at_zero = axes * spec_.camera.direction_at({region.left - 0.5, region.top - 0.5});
-  const double advance = range_m - 1.2 * target_->bounding_radius_m;
-  view_ = {(snapshot.camera.m + advance * at_zero).cast<float>(),
-           (advance * step_rad * axes.col(0)).cast<float>(),
-           (advance * step_rad * axes.col(1)).cast<float>(),
-           at_zero.cast<float>(),
-           (step_rad * axes.col(0)).cast<float>(),
-           (step_rad * axes.col(1)).cast<float>()};
-  return true;
+void LatticeRenderer::light_up(const Snapshot& snapshot) noexcept {
+  toward_sun_ = snapshot.sun.toward.unit.cast<float>();
+  target_->facets.light_up(snapshot, pool_);
+  if (snapshot.sun.irradiance_w_m2 > 0.0) sun_view_.update(snapshot.sun.toward.unit, pool_);
+  body_light_.light_up(snapshot, pool_);
+  bounced_.update(body_light_.to_camera(), snapshot.camera.m, pool_);
 }
 
-/// There is one for each thread of the pool.
-LatticeRenderer::Bench& LatticeRenderer::take_bench() noexcept {
-  for (std::size_t i = 0;; i = (i + 1) % benches_.size())
-    if (!benches_[i]->taken.exchange(true, std::memory_order_acquire)) return *benches_[i];
-}
-
-void LatticeRenderer::shade_pixel_row(const Snapshot& snapshot, Radiance& out, int row) noexcept {
-  const int s = spec_.grid.oversampling;
+void LatticeRenderer::shade_row(const Snapshot& snapshot, Radiance& out, int index) noexcept {
   Bench& bench = take_bench();
-  RowCounts& counts = row_counts_[static_cast<std::size_t>(row)] = {};
-  raster_.see(row, bench.seen, bench.nearness, {});
-  for (int c = 0; c < s; ++c) {
-    const Strip strip{
-        snapshot, bench, counts, (row * s + c) * side_, c * side_, out.region.width() * s};
-    bench.shares.clear();
-    for (int cell = 0; cell < strip.cells; ++cell) collect(strip, cell);
-    for (std::size_t k = 0; k < kLamps; ++k) send(strip, k);
-    // All are judged before one is asked more.
-    for (int cell = 0; cell < strip.cells; ++cell)
-      bench.cells[static_cast<std::size_t>(cell)].fine = edge_of_shadow_beside(strip, cell);
-    for (int cell = 0; cell < strip.cells; ++cell)
-      if (bench.cells[static_cast<std::size_t>(cell)].fine) ask_the_rest(strip, cell);
-    for (std::size_t k = 0; k < kLamps; ++k) send(strip, k);
-    for (int cell = 0; cell < strip.cells; ++cell) {
-      out.grid.at(cell, row * s + c) =
-          direct_light(strip, cell) +
-          bounced_light(strip, cell, {1.0 * out.region.left, 1.0 * out.region.top});
-      out.cover.at(cell, row * s + c) =
-          static_cast<float>(bench.cells[static_cast<std::size_t>(cell)].points) /
-          static_cast<float>(side_ * side_);
-    }
+  bench.counts = {};
+  bench.doubts.clear();
+  bench.mirrors.clear();
+  const Row row{snapshot, out, bench, index};
+  view_.see(index, bench.seen, bench.nearness);
+  const int s = spec_.grid.oversampling;
+  for (int r = index * s; r < (index + 1) * s; ++r) {
+    const auto cells = out.grid.row(r);
+    std::fill(cells.begin(), cells.end(), 0.0F);
+    const auto cover = out.cover.row(r);
+    std::fill(cover.begin(), cover.end(), 0.0F);
   }
+  const PixelRect region = out.region;
+  for (int column = 0; column < region.width(); ++column)
+    if (view_.footprint().marked(region.left + column, region.top + index))
+      shade_pixel(row, column);
+  settle(row);
+  row_counts_[at(index)] = bench.counts;
   bench.taken.store(false, std::memory_order_release);
 }
 
-std::uint32_t LatticeRenderer::seen(const Strip& strip, int i, int y) const noexcept {
-  return strip.bench.seen[static_cast<std::size_t>(strip.first_bench_row + y) * raster_.stride() +
-                          static_cast<std::size_t>(i)];
+bool LatticeRenderer::all_see(const Row& row, int column, std::uint32_t facet) const noexcept {
+  const int n = view_.points_a_pixel();
+  std::uint32_t differs = 0;
+  for (int y = 0; y < n; ++y) {
+    const std::uint32_t* seen = &row.bench.seen[at(y) * view_.stride() + at(column * n)];
+    for (int x = 0; x < n; ++x) differs |= seen[x] ^ facet;
+  }
+  return differs == 0;
 }
 
-/// The facets of a cell, and a part of its points asked for the lamps.
-void LatticeRenderer::collect(const Strip& strip, int cell) const noexcept {
-  std::vector<Share>& shares = strip.bench.shares;
-  const std::size_t first = shares.size();
-  std::size_t share = first;
-  int points = 0;
-  for (int y = 0; y < side_; ++y) {
-    for (int x = 0; x < side_; ++x) {
-      const std::uint32_t facet = seen(strip, cell * side_ + x, y);
-      if (facet == TriangleRaster::kNone) continue;
-      ++points;
-      const auto& light = target_->facets.radiance(facet);
-      if (light[0] <= 0.0F && light[1] <= 0.0F) continue;
-      if (share >= shares.size() || shares[share].facet != facet) {
-        for (share = first; share < shares.size() && shares[share].facet != facet;) ++share;
-        if (share == shares.size())
-          shares.push_back({facet, static_cast<std::uint16_t>(y * side_ + x), 0, 0, {}});
-      }
-      ++shares[share].points;
-      if (asks_first(x, y)) ask(strip, share, cell * side_ + x, y);
-    }
+void LatticeRenderer::shade_pixel(const Row& row, int column) const noexcept {
+  const int n = view_.points_a_pixel();
+  std::vector<Tone>& tones = row.bench.tones;
+  tones.clear();
+  const std::uint32_t first = row.bench.seen[at(column * n)];
+  if (all_see(row, column, first)) {
+    if (first == TriangleRaster::kNone) return;
+    Tone tone;
+    tone.facet = first;
+    tone.points = static_cast<std::uint32_t>(n * n);
+    tone.in_cell.fill(static_cast<std::uint16_t>(view_.side() * view_.side()));
+    tone.sum_x = tone.sum_y = 0.5F * static_cast<float>(n) * static_cast<float>(n * n);
+    tones.push_back(tone);
+  } else {
+    collect(row, column);
   }
-  for (share = first; share < shares.size(); ++share) {
-    // One that no point of the pattern falls on.
-    Share& s = shares[share];
-    if (s.asked == 0) {
-      ask(strip, share, cell * side_ + s.first_point % side_, s.first_point / side_);
-      s.asks_at_first_point = true;
-    }
-  }
-  strip.counts.hits += static_cast<std::uint64_t>(points);
-  strip.bench.cells[static_cast<std::size_t>(cell)] = {
-      points, static_cast<std::uint32_t>(first), static_cast<std::uint32_t>(shares.size()), false};
+  for (const Tone& tone : tones) shade(row, column, tone);
 }
 
-/// Whether a lamp reaches a part of what was asked in the cells to the left and right.
-bool LatticeRenderer::edge_of_shadow_beside(const Strip& strip, int cell) const noexcept {
-  std::array<unsigned, kLamps> asked{};
-  std::array<unsigned, kLamps> hidden{};
-  for (const int beside : {cell - 1, cell + 1}) {
-    if (beside < 0 || beside >= strip.cells) continue;
-    const Cell& c = strip.bench.cells[static_cast<std::size_t>(beside)];
-    for (std::uint32_t i = c.first_share; i < c.end_share; ++i) {
-      const Share& share = strip.bench.shares[i];
-      const auto& light = target_->facets.radiance(share.facet);
-      for (std::size_t k = 0; k < kLamps; ++k) {
-        if (light[k] <= 0.0F) continue;
-        asked[k] += share.asked;
-        hidden[k] += share.hidden[k];
-      }
-    }
-  }
-  bool edge = false;
-  for (std::size_t k = 0; k < kLamps; ++k) edge = edge || (hidden[k] > 0 && hidden[k] < asked[k]);
-  return edge;
-}
-
-void LatticeRenderer::ask_the_rest(const Strip& strip, int cell) const noexcept {
-  const Cell& c = strip.bench.cells[static_cast<std::size_t>(cell)];
-  for (int y = 0; y < side_; ++y) {
-    for (int x = 0; x < side_; ++x) {
-      if (asks_first(x, y)) continue;
-      const std::uint32_t facet = seen(strip, cell * side_ + x, y);
-      for (std::uint32_t i = c.first_share; i < c.end_share; ++i) {
-        const Share& share = strip.bench.shares[i];
-        if (share.facet != facet) continue;
-        if (!share.asks_at_first_point || share.first_point != y * side_ + x)
-          ask(strip, i, cell * side_ + x, y);
-        break;
+/// The facets of a pixel, from runs of one facet in a row of points of a cell.
+void LatticeRenderer::collect(const Row& row, int column) const noexcept {
+  const int n = view_.points_a_pixel();
+  const int side = view_.side();
+  std::size_t last = 0;
+  for (int y = 0; y < n; ++y) {
+    const std::uint32_t* seen = &row.bench.seen[at(y) * view_.stride() + at(column * n)];
+    for (int cell_x = 0; cell_x < n; cell_x += side) {
+      int begin = cell_x;
+      for (int x = cell_x + 1; x <= cell_x + side; ++x) {
+        if (x < cell_x + side && seen[x] == seen[begin]) continue;
+        if (seen[begin] != TriangleRaster::kNone)
+          add_run(row, last, seen[begin], begin, y, x - begin);
+        begin = x;
       }
     }
   }
 }
 
-/// Pre: the facet is one that the point sees.
-SurfacePoint LatticeRenderer::point_at(std::uint32_t facet, int i, int j,
-                                       Vector3f& direction) const noexcept {
-  const float x = static_cast<float>(i) + TriangleRaster::x_in_step(j);
-  const float y = static_cast<float>(j) + TriangleRaster::y_in_step(i);
-  direction = view_.direction + x * view_.direction_per_x + y * view_.direction_per_y;
-  const Vector3f start = view_.start + x * view_.start_per_x + y * view_.start_per_y;
-  return target_->facets.on_plane(facet, start, direction);
+void LatticeRenderer::add_run(const Row& row, std::size_t& last, std::uint32_t facet, int x, int y,
+                              int length) const noexcept {
+  std::vector<Tone>& tones = row.bench.tones;
+  if (last >= tones.size() || tones[last].facet != facet) {
+    for (last = 0; last < tones.size() && tones[last].facet != facet;) ++last;
+    if (last == tones.size()) {
+      tones.emplace_back();
+      tones.back().facet = facet;
+    }
+  }
+  Tone& tone = tones[last];
+  const auto points = static_cast<float>(length);
+  tone.points += static_cast<std::uint32_t>(length);
+  const int cell = y / view_.side() * spec_.grid.oversampling + x / view_.side();
+  tone.in_cell[at(cell)] =
+      static_cast<std::uint16_t>(tone.in_cell[at(cell)] + static_cast<unsigned>(length));
+  tone.sum_x += points * (static_cast<float>(x) + 0.5F * points);
+  tone.sum_y += points * (static_cast<float>(y) + 0.5F);
 }
 
-void LatticeRenderer::ask(const Strip& strip, std::size_t share, int i, int y) const noexcept {
-  Share& s = strip.bench.shares[share];
+/// Light of `points` of a cell's.
+void LatticeRenderer::add(const Row& row, int column, std::size_t cell, float points,
+                          float radiance) const noexcept {
+  const int s = spec_.grid.oversampling;
+  const auto all = static_cast<float>(view_.side() * view_.side());
+  row.out.grid.at(column * s + static_cast<int>(cell) % s,
+                  row.index * s + static_cast<int>(cell) / s) += radiance * points / all;
+}
+
+void LatticeRenderer::shade(const Row& row, int column, const Tone& tone) const noexcept {
+  const int s = spec_.grid.oversampling;
+  const int n = view_.points_a_pixel();
+  const auto all = static_cast<float>(view_.side() * view_.side());
+  row.bench.counts.hits += tone.points;
+  const auto points = static_cast<float>(tone.points);
   Vector3f direction;
-  const Vector3f start = point_at(s.facet, i, strip.first_point_row + y, direction).start();
-  ++s.asked;
-  const auto& light = target_->facets.radiance(s.facet);
-  for (std::size_t k = 0; k < kLamps; ++k) {
-    if (light[k] <= 0.0F) continue;
-    ShadowQueue& queue = strip.bench.queues[k];
-    queue.rays.set(queue.used, start, toward_lamp_[k]);
-    queue.share[static_cast<std::size_t>(queue.used)] = static_cast<std::uint32_t>(share);
-    if (++queue.used == RayPacket::kLanes) send(strip, k);
+  const SurfacePoint middle =
+      view_.place_on(tone.facet, static_cast<float>(column * n) + tone.sum_x / points,
+                     static_cast<float>(row.index * n) + tone.sum_y / points, direction);
+  const std::uint32_t patch = body_light_.patches().at(middle);
+  const bool crowded = patch != SurfacePatches::kNone &&
+                       body_light_.patches().patch(patch).crowded() && spec_.bounces > 0 &&
+                       spec_.bounce_paths > 0;
+  float smooth = 0.0F;
+  if (crowded) {
+    smooth = bounced_by_paths(row, column, tone);
+  } else if (patch != SurfacePatches::kNone) {
+    const auto [second, third] = target_->facets.weights_at(tone.facet, middle.place);
+    smooth = bounced_.at(tone.facet, second, third, body_light_.to_camera()[patch]);
+  }
+  const float earthshine = target_->facets.radiance(tone.facet)[1];
+  if (earthshine > 0.0F && patch != SurfacePatches::kNone)
+    smooth += earthshine * body_light_.lit_share(1, patch);
+  for (std::size_t cell = 0; cell < at(s * s); ++cell) {
+    if (tone.in_cell[cell] == 0) continue;
+    const auto here = static_cast<float>(tone.in_cell[cell]);
+    add(row, column, cell, here, smooth);
+    row.out.cover.at(column * s + static_cast<int>(cell) % s,
+                     row.index * s + static_cast<int>(cell) / s) += here / all;
+  }
+  if (target_->facets.radiance(tone.facet)[kSun] > 0.0F) add_sun(row, column, tone);
+
+  // A path finds what is mirrored, too.
+  if (crowded) return;
+  const float share =
+      body_light_.mirror_share(middle.material, -middle.normal.dot(direction) / direction.norm());
+  if (share <= 0.0F) return;
+  Queue& queue = row.bench.mirror_rays;
+  queue.rays.set(queue.used, middle.start(),
+                 direction - 2.0F * direction.dot(middle.normal) * middle.normal);
+  queue.who[at(queue.used)] = static_cast<std::uint32_t>(row.bench.mirrors.size());
+  row.bench.mirrors.push_back({column, tone.facet, share, tone.in_cell});
+  if (++queue.used == RayPacket::kLanes) send_mirror_rays(row);
+}
+
+/// Where surfaces stand close together light changes over less than a patch.
+float LatticeRenderer::bounced_by_paths(const Row& row, int column,
+                                        const Tone& tone) const noexcept {
+  const int n = view_.points_a_pixel();
+  const auto all = static_cast<std::uint32_t>(n * n);
+  const std::uint32_t paths =
+      (static_cast<std::uint32_t>(spec_.bounce_paths) * tone.points + all - 1) / all;
+  // By the pixel's place on the detector, so that a moving region does not move the noise.
+  const auto u = static_cast<std::uint32_t>(row.out.region.left + column);
+  const auto v = static_cast<std::uint32_t>(row.out.region.top + row.index);
+  Draws draws(row.snapshot.seed ^ tone.facet, Stream::kLight, row.snapshot.sequence,
+              (v & 0xFFFFU) << 16U | (u & 0xFFFFU));
+  double sum = 0;
+  for (std::uint32_t path = 0; path < paths; ++path) {
+    int x = 0;
+    int y = 0;
+    bool on_facet = false;
+    for (int t = 0; t < kTries && !on_facet; ++t) {
+      const std::uint32_t point = draws.bits() % all;
+      x = static_cast<int>(point) % n;
+      y = static_cast<int>(point) / n;
+      on_facet = row.bench.seen[at(y) * view_.stride() + at(column * n + x)] == tone.facet;
+    }
+    float place_x = tone.sum_x / static_cast<float>(tone.points);
+    float place_y = tone.sum_y / static_cast<float>(tone.points);
+    if (on_facet) {
+      place_x = static_cast<float>(x) + TriangleRaster::x_in_step(row.index * n + y);
+      place_y = static_cast<float>(y) + TriangleRaster::y_in_step(column * n + x);
+    }
+    Vector3f direction;
+    const SurfacePoint from =
+        view_.place_on(tone.facet, static_cast<float>(column * n) + place_x,
+                       static_cast<float>(row.index * n) + place_y, direction);
+    sum += bounced_paths_.radiance(row.snapshot, from, direction.cast<double>().normalized(), draws,
+                                   row.bench.counts.rays);
+  }
+  return static_cast<float>(sum / paths);
+}
+
+void LatticeRenderer::add_sun(const Row& row, int column, const Tone& tone) const noexcept {
+  const Lit whole = sun_view_.facet(tone.facet);
+  if (whole == Lit::kNo) return;
+  const int s = spec_.grid.oversampling;
+  const int n = view_.points_a_pixel();
+  const auto x = static_cast<float>(column * n);
+  const auto y = static_cast<float>(row.index * n);
+  const auto span = static_cast<float>(n);
+  Vector2f corner;
+  Vector2f per_cell_x;
+  Vector2f per_cell_y;
+  if (whole == Lit::kUnknown) {
+    // The pixel on the Sun's map: near enough a parallelogram.
+    Vector3f direction;
+    corner = sun_view_.on_map(view_.place_on(tone.facet, x, y, direction).place);
+    per_cell_x =
+        (sun_view_.on_map(view_.place_on(tone.facet, x + span, y, direction).place) - corner) /
+        static_cast<float>(s);
+    per_cell_y =
+        (sun_view_.on_map(view_.place_on(tone.facet, x, y + span, direction).place) - corner) /
+        static_cast<float>(s);
+  }
+  const float light = target_->facets.radiance(tone.facet)[kSun];
+  for (std::size_t cell = 0; cell < at(s * s); ++cell) {
+    if (tone.in_cell[cell] == 0) continue;
+    Lit lit = whole;
+    if (lit == Lit::kUnknown) {
+      const Vector2f a = corner + static_cast<float>(static_cast<int>(cell) % s) * per_cell_x +
+                         static_cast<float>(static_cast<int>(cell) / s) * per_cell_y;
+      const Vector2f b = a + per_cell_x;
+      const Vector2f c = a + per_cell_y;
+      const Vector2f d = b + per_cell_y;
+      lit = sun_view_.places(tone.facet, a.cwiseMin(b).cwiseMin(c).cwiseMin(d),
+                             a.cwiseMax(b).cwiseMax(c).cwiseMax(d));
+    }
+    if (lit == Lit::kYes) add(row, column, cell, static_cast<float>(tone.in_cell[cell]), light);
+    if (lit == Lit::kUnknown) doubt(row, column, tone, cell);
   }
 }
 
-void LatticeRenderer::send(const Strip& strip, std::size_t lamp) const noexcept {
-  ShadowQueue& queue = strip.bench.queues[lamp];
-  const auto used = static_cast<std::size_t>(std::exchange(queue.used, 0));
+void LatticeRenderer::doubt(const Row& row, int column, const Tone& tone,
+                            std::size_t cell) const noexcept {
+  const int s = spec_.grid.oversampling;
+  const std::size_t index = row.bench.doubts.size();
+  row.bench.doubts.push_back({tone.facet, column * s + static_cast<int>(cell) % s,
+                              static_cast<int>(cell) / s, tone.in_cell[cell], 0, 0});
+  ask(row, index, false);
+}
+
+/// By rays: first one point in four, or all of few; then, at last, the others.
+void LatticeRenderer::ask(const Row& row, std::size_t doubt, bool rest) const noexcept {
+  Bench& bench = row.bench;
+  Doubt& d = bench.doubts[doubt];
+  const int side = view_.side();
+  const bool all = d.points <= kFewPoints;
+  for (int y = 0; y < side; ++y) {
+    const int bench_row = d.cell_row * side + y;
+    const std::uint32_t* seen = &bench.seen[at(bench_row) * view_.stride() + at(d.column * side)];
+    for (int x = 0; x < side; ++x) {
+      if (seen[x] != d.facet || (!all && asks_first(x, y) == rest)) continue;
+      const int i = d.column * side + x;
+      const int j = row.index * view_.points_a_pixel() + bench_row;
+      Vector3f direction;
+      const SurfacePoint point =
+          view_.place_on(d.facet, static_cast<float>(i) + TriangleRaster::x_in_step(j),
+                         static_cast<float>(j) + TriangleRaster::y_in_step(i), direction);
+      Queue& queue = bench.shadow_rays;
+      queue.rays.set(queue.used, point.start(), toward_sun_);
+      queue.who[at(queue.used)] = static_cast<std::uint32_t>(doubt);
+      ++d.asked;
+      if (++queue.used == RayPacket::kLanes) send_shadow_rays(bench);
+    }
+  }
+}
+
+void LatticeRenderer::send_shadow_rays(Bench& bench) const noexcept {
+  Queue& queue = bench.shadow_rays;
+  const std::size_t used = at(std::exchange(queue.used, 0));
   if (used == 0) return;
   for (std::size_t i = used; i < RayPacket::kLanes; ++i) queue.rays.active[i] = false;
   std::array<bool, RayPacket::kLanes> blocked{};
-  target_->scene.occluded(queue.rays, blocked, strip.counts.rays);
+  target_->scene.occluded(queue.rays, blocked, bench.counts.rays);
   for (std::size_t i = 0; i < used; ++i)
-    if (blocked[i]) ++strip.bench.shares[queue.share[i]].hidden[lamp];
+    if (blocked[i]) ++bench.doubts[queue.who[i]].hidden;
 }
 
-float LatticeRenderer::direct_light(const Strip& strip, int cell) const noexcept {
-  const Cell& c = strip.bench.cells[static_cast<std::size_t>(cell)];
-  float sum = 0.0F;
-  for (std::uint32_t i = c.first_share; i < c.end_share; ++i) {
-    const Share& share = strip.bench.shares[i];
-    const auto& light = target_->facets.radiance(share.facet);
-    const float each = static_cast<float>(share.points) / static_cast<float>(share.asked);
-    for (std::size_t k = 0; k < kLamps; ++k)
-      sum += light[k] * each * static_cast<float>(share.asked - share.hidden[k]);
+void LatticeRenderer::send_mirror_rays(const Row& row) const noexcept {
+  Bench& bench = row.bench;
+  Queue& queue = bench.mirror_rays;
+  const std::size_t used = at(std::exchange(queue.used, 0));
+  if (used == 0) return;
+  for (std::size_t i = used; i < RayPacket::kLanes; ++i) queue.rays.active[i] = false;
+  std::array<MeshHit, RayPacket::kLanes> hits;
+  target_->scene.intersect(queue.rays, hits, bench.counts.rays);
+  for (std::size_t i = 0; i < used; ++i) {
+    if (hits[i].triangle == MeshHit::kNone) continue;
+    const Vector3f direction(queue.rays.direction_x[i], queue.rays.direction_y[i],
+                             queue.rays.direction_z[i]);
+    const Mirror& mirror = bench.mirrors[queue.who[i]];
+    const float light = mirror.share * body_light_.leaving(target_->facets.at(hits[i], direction));
+    for (std::size_t cell = 0; cell < kMostCells; ++cell)
+      if (mirror.in_cell[cell] > 0)
+        add(row, mirror.column, cell, static_cast<float>(mirror.in_cell[cell]), light);
   }
-  return sum / static_cast<float>(side_ * side_);
 }
 
-/// From points of the cell that chance chooses: where they see nothing they bring nothing.
-float LatticeRenderer::bounced_light(const Strip& strip, int cell,
-                                     PixelPoint place) const noexcept {
-  if (spec_.bounces == 0 || spec_.bounce_paths == 0) return 0.0F;
-  // By the cell's place on the detector, so that a moving region does not move the noise.
+/// What is still open when the row's pixels are done.
+void LatticeRenderer::settle(const Row& row) const noexcept {
+  Bench& bench = row.bench;
+  send_mirror_rays(row);
+  send_shadow_rays(bench);
+  for (std::size_t i = 0; i < bench.doubts.size(); ++i) {
+    const Doubt& d = bench.doubts[i];
+    // None of a few in four may be on the first points.
+    if (d.asked < d.points && (d.asked == 0 || (d.hidden > 0 && d.hidden < d.asked)))
+      ask(row, i, true);
+  }
+  send_shadow_rays(bench);
   const int s = spec_.grid.oversampling;
-  const auto u = static_cast<std::uint32_t>(static_cast<int>(place.u) * s + cell);
-  const auto v = static_cast<std::uint32_t>(static_cast<int>(place.v) * s) +
-                 static_cast<std::uint32_t>(strip.first_point_row / side_);
-  Draws draws(strip.snapshot.seed, Stream::kLight, strip.snapshot.sequence,
-              (v & 0xFFFFU) << 16U | (u & 0xFFFFU));
-  const auto points = static_cast<std::uint32_t>(side_ * side_);
-  double sum = 0;
-  for (int path = 0; path < spec_.bounce_paths; ++path) {
-    const int point = static_cast<int>(draws.bits() % points);
-    const int i = cell * side_ + point % side_;
-    const int y = point / side_;
-    const std::uint32_t facet = seen(strip, i, y);
-    if (facet == TriangleRaster::kNone) continue;
-    Vector3f direction;
-    const SurfacePoint from = point_at(facet, i, strip.first_point_row + y, direction);
-    sum += bounced_.radiance(strip.snapshot, from, direction.cast<double>().normalized(), draws,
-                             strip.counts.rays);
+  for (const Doubt& d : bench.doubts) {
+    const auto asked = static_cast<float>(d.asked);
+    const float lit = static_cast<float>(d.points) * (asked - static_cast<float>(d.hidden)) / asked;
+    const int cell = d.cell_row * s + d.column % s;
+    add(row, d.column / s, at(cell), lit, target_->facets.radiance(d.facet)[kSun]);
   }
-  return static_cast<float>(sum / spec_.bounce_paths);
 }
 
 }  // namespace engine

@@ -11,8 +11,8 @@ RenderSpec read_render(const ConfigTable& table) {
   RenderSpec spec;
   spec.method = table.choice_or<RenderMethod>(
       "method", "paths", {{"lattice", RenderMethod::kLattice}, {"paths", RenderMethod::kPaths}});
-  spec.lattice_side = table.choice_or<int>("lattice", "8x8", {{"8x8", 8}, {"4x4", 4}});
-  spec.bounce_paths = static_cast<int>(table.integer_or("bounce_paths", 1, between(0, 64)));
+  spec.lattice_side = table.choice_or<int>("lattice", "8x8", {{"8x8", 8}, {"4x4", 4}, {"2x2", 2}});
+  spec.bounce_paths = static_cast<int>(table.integer_or("bounce_paths", 64, between(0, 4096)));
   spec.samples_per_pixel =
       static_cast<int>(table.integer_or("samples_per_pixel", 50, between(1, 100000)));
   spec.bounces = static_cast<int>(table.integer_or("bounces", 1, between(0, 16)));

@@ -116,6 +116,8 @@ double Brdf::albedo(double cos_in) const noexcept {
   return std::min(1.0, kPi * p_.kd / cos_in + specular);
 }
 
+double Brdf::diffuse_albedo() const noexcept { return std::min(1.0, kPi * p_.kd); }
+
 void Brdf::tabulate_lobe() {
   if (p_.kb > 0.0) {
     const double half = 0.5 * lobe(0.0);

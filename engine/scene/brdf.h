@@ -48,6 +48,8 @@ class Brdf {
                                   const Eigen::Vector3d& out) const noexcept;
   /// The share of light from `cos_in` that goes anywhere at all.
   [[nodiscard]] double albedo(double cos_in) const noexcept;
+  /// Of that, the part that goes everywhere alike; of the printed variant, in normal light.
+  [[nodiscard]] double diffuse_albedo() const noexcept;
 
   /// Of the specular lobe, in angles of the half vector: where it has fallen to a half; 0 without
   /// one.

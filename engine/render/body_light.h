@@ -1,0 +1,75 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "engine/core/worker_pool.h"
+#include "engine/render/hemisphere_bins.h"
+#include "engine/render/surface_patches.h"
+#include "engine/scene/snapshot.h"
+
+namespace engine {
+
+/// Light that comes to the target's surface by way of other places of it, kept on the body by
+/// patch and direction: it is smooth, a few per cent of all light, and changes over seconds.
+///
+/// What bounces leaves a patch evenly, with the albedo of the direction that it came from, as
+/// BouncedLight has it; towards the camera a patch reflects it by its BRDF.
+/// Lamps are taken from the nearest of directions 8 mrad apart: what is kept is a function of
+/// these alone, so that a frame does not depend on those before it.
+/// Leaves out what took more than `bounces` bounces; changes finer than a patch: see
+/// SurfacePatches::Patch::crowded().
+/// Thread: loop. Loop-safe but for the constructor. The target outlives it.
+class BodyLight {
+ public:
+  BodyLight(const TracedTarget& target, int bounces, WorkerPool& pool);
+
+  /// For the snapshot's lamps and camera.
+  void light_up(const Snapshot& snapshot, WorkerPool& pool) noexcept;
+
+  /// What each patch sends to the camera, in W/m^2/sr, but for what it mirrors.
+  [[nodiscard]] std::span<const float> to_camera() const noexcept { return to_camera_; }
+  /// Of the light that it mirrors, the share that it sends to the camera; 0 for most materials.
+  [[nodiscard]] float mirror_share(std::uint32_t material, float cos_out) const noexcept {
+    return binned_[material].mirror_share(cos_out);
+  }
+  /// What a mirror sees there: all that leaves the place's patch, lamps' light too, in W/m^2/sr; 0
+  /// where nothing is known.
+  [[nodiscard]] float leaving(const SurfacePoint& place) const noexcept {
+    const std::uint32_t patch = patches_.at(place);
+    return patch == SurfacePatches::kNone ? 0.0F : leaving_[patch];
+  }
+  /// Of a patch's points, the share that face a lamp and are reached by it.
+  [[nodiscard]] float lit_share(std::size_t lamp, std::uint32_t patch) const noexcept {
+    return lamps_[lamp].lit_share[patch];
+  }
+  [[nodiscard]] const SurfacePatches& patches() const noexcept { return patches_; }
+
+ private:
+  /// What a lamp of 1 W/m^2 does.
+  struct Kept {
+    Eigen::Vector3f toward = Eigen::Vector3f::Zero();  ///< zero: nothing kept
+    std::vector<float> lit_share;
+    std::vector<float> leaving;
+    std::vector<HemisphereBins::Values> arriving;  ///< radiance by bin, in the patch's axes
+  };
+  template <class Work>
+  void each_patch(WorkerPool& pool, const Work& work) const noexcept;
+  void renew(Kept& kept, const Eigen::Vector3f& toward, WorkerPool& pool) noexcept;
+  void ask(Kept& kept, std::size_t first, std::size_t end) const noexcept;
+  void gather(std::size_t patch, HemisphereBins::Values& arriving) const noexcept;
+
+  const TracedTarget& target_;
+  int bounces_;
+  SurfacePatches patches_;
+  std::vector<BinnedBrdf> binned_;  ///< by material
+  std::array<Kept, kLamps> lamps_;
+  std::vector<float> sent_;  ///< by patch, of one bounce
+  std::vector<float> next_;
+  std::vector<float> to_camera_;
+  std::vector<float> leaving_;
+};
+
+}  // namespace engine

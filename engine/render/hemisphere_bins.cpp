@@ -1,0 +1,115 @@
+#include "engine/render/hemisphere_bins.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/core/constants.h"
+
+namespace engine {
+namespace {
+
+using Eigen::Vector3d;
+using Eigen::Vector3f;
+
+// A lobe whose half vector stays within this is a mirror to the bins: they are twice as wide.
+constexpr double kNarrow_rad = 4.0 * kDegree;
+constexpr int kStepsInBin = 6;
+
+std::size_t at(int i) noexcept { return static_cast<std::size_t>(i); }
+
+}  // namespace
+
+Vector3f HemisphereBins::direction(std::size_t bin, float a, float b) noexcept {
+  const auto x = 2.0F * (static_cast<float>(bin % kSide) + a) / kSide - 1.0F;
+  const auto y = 2.0F * (static_cast<float>(bin / kSide) + b) / kSide - 1.0F;
+  constexpr auto kQuarter = static_cast<float>(kPi / 4.0);
+  float r = 0.0F;
+  float phi = 0.0F;
+  if (std::abs(x) > std::abs(y)) {
+    r = x;
+    phi = kQuarter * y / x;
+  } else if (y != 0.0F) {
+    r = y;
+    phi = 2.0F * kQuarter - kQuarter * x / y;
+  }
+  return {r * std::cos(phi), r * std::sin(phi), std::sqrt(std::max(0.0F, 1.0F - r * r))};
+}
+
+BinnedBrdf::BinnedBrdf(const Brdf& brdf)
+    : diffuse_share_(static_cast<float>(brdf.diffuse_albedo() / HemisphereBins::kBins)),
+      narrow_(brdf.lobe_half_width_rad() < kNarrow_rad) {
+  if (brdf.lobe_half_width_rad() == 0.0) return;
+  if (!narrow_) {
+    tabulate(brdf);
+    return;
+  }
+  for (std::size_t i = 0; i < kCosines; ++i) {
+    const double c = (static_cast<double>(i) + 0.5) / kCosines;
+    mirror_share_[i] = static_cast<float>(std::max(0.0, brdf.albedo(c) - brdf.diffuse_albedo()));
+  }
+}
+
+void BinnedBrdf::tabulate(const Brdf& brdf) {
+  weights_.resize(kCosines * kAzimuths);
+  for (std::size_t i = 0; i < kCosines; ++i) {
+    const double c = (static_cast<double>(i) + 0.5) / kCosines;
+    const double s = std::sqrt(1.0 - c * c);
+    for (std::size_t k = 0; k < kAzimuths; ++k) {
+      const double azimuth = 2.0 * kPi * static_cast<double>(k) / kAzimuths;
+      const Vector3d out(s * std::cos(azimuth), s * std::sin(azimuth), c);
+      HemisphereBins::Values& row = weights_[i * kAzimuths + k];
+      for (std::size_t bin = 0; bin < HemisphereBins::kBins; ++bin) {
+        double mean = 0;
+        for (int p = 0; p < kStepsInBin * kStepsInBin; ++p) {
+          const Vector3f in = HemisphereBins::direction(
+              bin, (static_cast<float>(p % kStepsInBin) + 0.5F) / kStepsInBin,
+              (static_cast<float>(p / kStepsInBin) + 0.5F) / kStepsInBin);
+          mean += brdf.eval(in.cast<double>(), out) / (kStepsInBin * kStepsInBin);
+        }
+        // A bin holds pi/64 of the integral over the hemisphere by the cosine.
+        row[bin] = static_cast<float>(mean * kPi / HemisphereBins::kBins);
+      }
+    }
+  }
+}
+
+float BinnedBrdf::reflected(const HemisphereBins::Values& arriving,
+                            const Vector3f& out) const noexcept {
+  if (weights_.empty()) {
+    float sum = 0.0F;
+    for (const float a : arriving) sum += a;
+    return diffuse_share_ * sum;
+  }
+  const float cell = std::clamp(out.z() * kCosines - 0.5F, 0.0F, kCosines - 1.0F);
+  const auto low = std::min(static_cast<std::size_t>(cell), kCosines - 2);
+  const float part = cell - static_cast<float>(low);
+  constexpr auto kPerTurn = static_cast<float>(kAzimuths / (2.0 * kPi));
+  const float turn = std::atan2(out.y(), out.x()) * kPerTurn + kAzimuths;
+  const float whole = std::floor(turn);
+  const float between = turn - whole;
+  const std::size_t left = at(static_cast<int>(whole)) % kAzimuths;
+  const std::size_t right = (left + 1) % kAzimuths;
+  const HemisphereBins::Values& a = row(low, left);
+  const HemisphereBins::Values& b = row(low, right);
+  const HemisphereBins::Values& c = row(low + 1, left);
+  const HemisphereBins::Values& d = row(low + 1, right);
+  std::array<float, 16> sums{};
+  for (std::size_t i = 0; i < HemisphereBins::kBins; ++i) {
+    const float lower = a[i] + between * (b[i] - a[i]);
+    const float upper = c[i] + between * (d[i] - c[i]);
+    sums[i % sums.size()] += arriving[i] * (lower + part * (upper - lower));
+  }
+  float sum = 0.0F;
+  for (const float s : sums) sum += s;
+  return sum;
+}
+
+float BinnedBrdf::mirror_share(float cos_out) const noexcept {
+  if (!narrow_) return 0.0F;
+  const float cell = std::clamp(cos_out * kCosines - 0.5F, 0.0F, kCosines - 1.0F);
+  const auto low = std::min(static_cast<std::size_t>(cell), kCosines - 2);
+  const float part = cell - static_cast<float>(low);
+  return mirror_share_[low] + part * (mirror_share_[low + 1] - mirror_share_[low]);
+}
+
+}  // namespace engine

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "engine/scene/brdf.h"
+
+namespace engine {
+
+/// The directions above a surface in 64 bins, each with an equal share of what falls on it by the
+/// cosine: squares of a unit square laid on the hemisphere's disc (Shirley & Chiu 1997, A low
+/// distortion map between disk and square, JGT 2(3)).
+struct HemisphereBins {
+  static constexpr int kSide = 8;
+  static constexpr std::size_t kBins = std::size_t{kSide} * kSide;
+  using Values = std::array<float, kBins>;
+
+  /// A unit vector in the bin; `a` and `b` in [0, 1) say where. z is the normal.
+  [[nodiscard]] static Eigen::Vector3f direction(std::size_t bin, float a, float b) noexcept;
+};
+
+/// How a surface sends to the camera what arrives by bins: eval() of its BRDF, summed up before.
+///
+/// For lobes wider than the bins, some 15 deg; of a narrower lobe only the diffuse part is here,
+/// and mirror_share() says what is left for a ray to find.
+/// Thread: any. Loop-safe but for the constructor.
+class BinnedBrdf {
+ public:
+  explicit BinnedBrdf(const Brdf& brdf);
+
+  /// Radiance towards the unit vector `out`, z the normal, when `arriving` comes in. At most its
+  /// largest value.
+  [[nodiscard]] float reflected(const HemisphereBins::Values& arriving,
+                                const Eigen::Vector3f& out) const noexcept;
+  /// Of light that leaves at this cosine, the albedo of the lobe that is too narrow for the bins.
+  [[nodiscard]] float mirror_share(float cos_out) const noexcept;
+
+ private:
+  static constexpr std::size_t kCosines = 12;
+  static constexpr std::size_t kAzimuths = 24;
+
+  [[nodiscard]] const HemisphereBins::Values& row(std::size_t cosine,
+                                                  std::size_t azimuth) const noexcept {
+    return weights_[cosine * kAzimuths + azimuth];
+  }
+  void tabulate(const Brdf& brdf);
+
+  float diffuse_share_ = 0;  ///< of a bin's light, if every direction gets the same
+  bool narrow_ = false;
+  std::vector<HemisphereBins::Values> weights_;  ///< by cosine and azimuth of `out`; empty: diffuse
+  std::array<float, kCosines> mirror_share_{};
+};
+
+}  // namespace engine

@@ -1,0 +1,138 @@
+#include "engine/render/lamp_view.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <limits>
+
+#include "engine/render/facets.h"
+
+namespace engine {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+constexpr int kBandRows = 16;
+constexpr double kDirectionsARadian = 1000.0;
+// What stands above a plane by less is taken to lie on it: corners are whole sixteenths of a step
+// on the map, so a plane is off by that on its slope, and rounding adds some.
+constexpr float kAbove_steps = 0.05F;
+constexpr float kAcross_steps = 0.25F;
+constexpr int kMostSteps = 12;
+
+}  // namespace
+
+LampView::LampView(const Mesh& mesh)
+    : mesh_(mesh),
+      radius_m_(mesh.bounding_radius_m()),
+      raster_(mesh.vertices.size(), mesh.triangles.size(), kSide / kBandRows),
+      corners_(mesh.vertices.size()),
+      map_(std::size_t{kSide} * kSide),
+      nearness_(map_.size()),
+      covered_(mesh.triangles.size()),
+      seen_(mesh.triangles.size()),
+      states_(mesh.triangles.size(), Lit::kUnknown),
+      planes_(mesh.triangles.size()) {}
+
+void LampView::update(const Vector3d& toward, WorkerPool& pool) noexcept {
+  const Vector3d rounded = (toward * kDirectionsARadian).array().round().matrix().normalized();
+  if (rounded == toward_) return;
+  toward_ = rounded;
+  const Matrix3d axes = basis_round(rounded);
+  const double steps_a_m = 0.5 * kSide / radius_m_;
+  to_map_ = (steps_a_m * axes.topRows<2>()).cast<float>();
+  for (std::size_t i = 0; i < corners_.size(); ++i) {
+    const Vector3d p = axes * mesh_.vertices[i].cast<double>();
+    corners_[i] = {0.5 * kSide + steps_a_m * p.x(), 0.5 * kSide + steps_a_m * p.y(), p.z()};
+  }
+  std::fill(covered_.begin(), covered_.end(), 0U);
+  std::fill(seen_.begin(), seen_.end(), 0U);
+  // A direction that is no number does not fit: everything is asked for by rays.
+  const int side = kSide;
+  const bool fits = raster_.place(mesh_, corners_, side, side, kBandRows);
+  if (fits) pool.rows(0, raster_.bands(), [this](int band) { draw(band); });
+  for (std::uint32_t f = 0; f < states_.size(); ++f) {
+    if (fits) {
+      judge(f, axes);
+    } else {
+      states_[f] = Lit::kUnknown;
+      planes_[f] = {std::numeric_limits<float>::quiet_NaN(), 0.0F, 0.0F};
+    }
+  }
+}
+
+void LampView::judge(std::uint32_t facet, const Matrix3d& axes) noexcept {
+  states_[facet] = Lit::kUnknown;
+  if (covered_[facet] > 0 && seen_[facet] == covered_[facet]) states_[facet] = Lit::kYes;
+  if (covered_[facet] > 0 && seen_[facet] == 0) states_[facet] = Lit::kNo;
+  const auto& corner = mesh_.triangles[facet].corner;
+  const Vector3d a = axes * mesh_.vertices[corner[0]].cast<double>();
+  const Vector3d b = axes * mesh_.vertices[corner[1]].cast<double>() - a;
+  const Vector3d c = axes * mesh_.vertices[corner[2]].cast<double>() - a;
+  const Vector3d normal = b.cross(c);
+  // Edge-on it is infinite or no number: neither above nor below anything.
+  const double per_x = -normal.x() / normal.z();
+  const double per_y = -normal.y() / normal.z();
+  const double m_a_step = 2.0 * radius_m_ / kSide;
+  planes_[facet] = {
+      static_cast<float>(a.z() - per_x * (a.x() + radius_m_) - per_y * (a.y() + radius_m_)),
+      static_cast<float>(per_x * m_a_step), static_cast<float>(per_y * m_a_step)};
+}
+
+void LampView::draw(int band) noexcept {
+  const std::size_t size = std::size_t{kSide} * kBandRows;
+  const std::size_t first = static_cast<std::size_t>(band) * size;
+  const auto map = std::span(map_).subspan(first, size);
+  raster_.see(band, map, std::span(nearness_).subspan(first, size), covered_);
+  // Runs of one facet are counted at once.
+  std::uint32_t facet = TriangleRaster::kNone;
+  std::uint32_t run = 0;
+  const auto count = [&] {
+    if (facet != TriangleRaster::kNone)
+      std::atomic_ref(seen_[facet]).fetch_add(run, std::memory_order_relaxed);
+  };
+  for (const std::uint32_t next : map) {
+    if (next != facet) {
+      count();
+      facet = next;
+      run = 0;
+    }
+    ++run;
+  }
+  count();
+}
+
+Lit LampView::places(std::uint32_t facet, const Eigen::Vector2f& low,
+                     const Eigen::Vector2f& high) const noexcept {
+  // With all points round the rectangle; not off the map, nor a number that is none.
+  const float end = kSide - 2.0F;
+  if (!(low.x() >= 1.0F && low.y() >= 1.0F && high.x() < end && high.y() < end))
+    return Lit::kUnknown;
+  const int left = static_cast<int>(low.x()) - 1;
+  const int top = static_cast<int>(low.y()) - 1;
+  const int right = static_cast<int>(high.x()) + 2;
+  const int bottom = static_cast<int>(high.y()) + 2;
+  if (right - left > kMostSteps || bottom - top > kMostSteps) return Lit::kUnknown;
+  const Plane& plane = planes_[facet];
+  const float margin = kAbove_steps * 2.0F * static_cast<float>(radius_m_) / kSide +
+                       kAcross_steps * (std::abs(plane.per_x) + std::abs(plane.per_y));
+  bool all_above = true;
+  bool any_above = false;
+  for (int j = top; j < bottom; ++j) {
+    const float* nearness = &nearness_[static_cast<std::size_t>(j) * kSide];
+    const float x_in_step = TriangleRaster::x_in_step(j);
+    const float row = plane.at_zero + margin + plane.per_y * static_cast<float>(j);
+    for (int i = left; i < right; ++i) {
+      const float height = row + plane.per_y * TriangleRaster::y_in_step(i) +
+                           plane.per_x * (static_cast<float>(i) + x_in_step);
+      const bool above = !(nearness[i] <= height);
+      any_above = any_above || above;
+      all_above = all_above && nearness[i] > height;
+    }
+  }
+  if (!any_above) return Lit::kYes;
+  return all_above ? Lit::kNo : Lit::kUnknown;
+}
+
+}  // namespace engine

@@ -1,0 +1,65 @@
+#include "engine/render/lattice_view.h"
+
+namespace engine {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using Eigen::Vector3f;
+
+// The nearest a target may be, in its own radii from its centre.
+constexpr double kNearest = 2.0;
+
+}  // namespace
+
+LatticeView::LatticeView(const RenderSpec& spec, std::shared_ptr<const TracedTarget> target)
+    : camera_(spec.camera),
+      oversampling_(spec.grid.oversampling),
+      target_(std::move(target)),
+      footprint_(spec.camera, spec.grid.beyond_frame_px, target_->mesh.vertices.size()),
+      raster_(target_->mesh.vertices.size(), target_->mesh.triangles.size(),
+              spec.camera.frame().grown_by(spec.grid.beyond_frame_px).height()),
+      corners_(target_->mesh.vertices.size()) {}
+
+bool LatticeView::place(const Snapshot& snapshot, int side) noexcept {
+  footprint_.project(target_->mesh, snapshot);
+  const PixelRect region = footprint_.region();
+  side_ = side;
+  points_a_pixel_ = oversampling_ * side;
+  const double range_m = snapshot.camera.m.norm();
+  // Not a number either.
+  if (!(range_m > kNearest * target_->bounding_radius_m)) return false;
+  const Matrix3d& axes = snapshot.body_from_camera.matrix;
+  const Matrix3d camera_from_body = axes.transpose();
+  for (std::size_t i = 0; i < corners_.size(); ++i) {
+    const Vector3d p =
+        camera_from_body * (target_->mesh.vertices[i].cast<double>() - snapshot.camera.m);
+    const auto at = camera_.project(p);
+    if (!at) return false;
+    // 1/z is linear on the detector; from the target's centre and in its radii it keeps its digits.
+    corners_[i] = {(at->u + 0.5 - region.left) * points_a_pixel_,
+                   (at->v + 0.5 - region.top) * points_a_pixel_,
+                   (range_m - p.z()) / p.z() * (range_m / target_->bounding_radius_m)};
+  }
+  if (!raster_.place(target_->mesh, corners_, region.width() * points_a_pixel_,
+                     region.height() * points_a_pixel_, points_a_pixel_))
+    return false;
+  const double step_rad = camera_.ifov_rad() / points_a_pixel_;
+  const Vector3d at_zero = axes * camera_.direction_at({region.left - 0.5, region.top - 0.5});
+  const double advance = range_m - 1.2 * target_->bounding_radius_m;
+  start_ = (snapshot.camera.m + advance * at_zero).cast<float>();
+  start_per_x_ = (advance * step_rad * axes.col(0)).cast<float>();
+  start_per_y_ = (advance * step_rad * axes.col(1)).cast<float>();
+  direction_ = at_zero.cast<float>();
+  direction_per_x_ = (step_rad * axes.col(0)).cast<float>();
+  direction_per_y_ = (step_rad * axes.col(1)).cast<float>();
+  return true;
+}
+
+SurfacePoint LatticeView::place_on(std::uint32_t facet, float x, float y,
+                                   Vector3f& direction) const noexcept {
+  direction = direction_ + x * direction_per_x_ + y * direction_per_y_;
+  return target_->facets.on_plane(facet, start_ + x * start_per_x_ + y * start_per_y_, direction);
+}
+
+}  // namespace engine
