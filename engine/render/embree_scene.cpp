@@ -74,6 +74,11 @@ RTCIntersectContext context_for(RTCIntersectContextFlags flags) noexcept {
   return context;
 }
 
+RTCIntersectContextFlags flag_of(RayCoherence coherence) noexcept {
+  return coherence == RayCoherence::kParallel ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT
+                                              : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
+}
+
 /// One for all scenes of the process, and never released: letting go of the last one would have the
 /// tracer start a thread of its own.
 RTCDevice tracing_device() {
@@ -142,12 +147,12 @@ bool EmbreeScene::occluded(const Eigen::Vector3f& origin, const Eigen::Vector3f&
 }
 
 void EmbreeScene::intersect(const RayPacket& rays, std::array<MeshHit, RayPacket::kLanes>& hits,
-                            RayCounts& counts) const noexcept {
+                            RayCounts& counts, RayCoherence coherence) const noexcept {
   RTCRayHit16 query;
   alignas(64) LaneMask mask;
   start_rays(rays, query.ray, mask, counts);
   std::fill(std::begin(query.hit.geomID), std::end(query.hit.geomID), RTC_INVALID_GEOMETRY_ID);
-  RTCIntersectContext context = context_for(RTC_INTERSECT_CONTEXT_FLAG_COHERENT);
+  RTCIntersectContext context = context_for(flag_of(coherence));
   rtcIntersect16(mask.data(), handles_->scene, &context, &query);
   for (std::size_t i = 0; i < hits.size(); ++i) {
     const bool hit = mask[i] != 0 && query.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
@@ -156,11 +161,11 @@ void EmbreeScene::intersect(const RayPacket& rays, std::array<MeshHit, RayPacket
 }
 
 void EmbreeScene::occluded(const RayPacket& rays, std::array<bool, RayPacket::kLanes>& blocked,
-                           RayCounts& counts) const noexcept {
+                           RayCounts& counts, RayCoherence coherence) const noexcept {
   RTCRay16 query;
   alignas(64) LaneMask mask;
   start_rays(rays, query, mask, counts);
-  RTCIntersectContext context = context_for(RTC_INTERSECT_CONTEXT_FLAG_COHERENT);
+  RTCIntersectContext context = context_for(flag_of(coherence));
   rtcOccluded16(mask.data(), handles_->scene, &context, &query);
   for (std::size_t i = 0; i < blocked.size(); ++i)
     blocked[i] = mask[i] != 0 && query.tfar[i] < 0.0F;

@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "engine/core/constants.h"
+#include "engine/core/random.h"
 #include "tests/support/csv.h"
 #include "tests/support/scenes.h"
 #include "tests/support/statistics.h"
@@ -47,6 +48,13 @@ Vector3d random_direction(std::mt19937_64& random) {
   const double a = 2.0 * kPi * unit(random);
   const double r = std::sqrt(1.0 - z * z);
   return {r * std::cos(a), r * std::sin(a), z};
+}
+
+Brdf::Sample drawn(const Brdf& brdf, const Vector3d& out, Draws& draws,
+                   BrdfSampler how = BrdfSampler::kMixture) {
+  const float u = draws.uniform();
+  const float v = draws.uniform();
+  return brdf.sample(out, how, {u, v}, draws.uniform());
 }
 
 /// What one direction scatters to, or gathers from, all others by the specular term alone: over
@@ -286,7 +294,7 @@ TEST(BrdfSample, DrawsWithItsDensity) {
       const std::array<double, 3> cones_deg{1.0, 5.0, 15.0};
       for (int i = 0; i < kDraws; ++i) {
         Draws draws(7, Stream::kLight, 0, static_cast<std::uint32_t>(i));
-        const Brdf::Sample s = brdf.sample(out, draws);
+        const Brdf::Sample s = drawn(brdf, out, draws);
         ASSERT_TRUE(s.in.allFinite() && std::isfinite(s.weight));
         ASSERT_NEAR(s.in.norm(), 1.0, 1e-9);
         const double density = brdf.pdf(s.in, out);
@@ -333,7 +341,7 @@ TEST(BrdfSample, WeightsAverageToTheLightGathered) {
         Moments weights;
         for (int i = 0; i < kDraws; ++i) {
           Draws draws(11, Stream::kLight, 0, static_cast<std::uint32_t>(i));
-          const double weight = brdf.sample(out, draws).weight;
+          const double weight = drawn(brdf, out, draws).weight;
           ASSERT_TRUE(weight >= 0.0 && std::isfinite(weight));
           weights.add(weight);
         }
@@ -364,7 +372,7 @@ TEST(BrdfSample, LambertWeighsEveryDrawItsAlbedo) {
   const Brdf brdf(test_support::lambert(0.3), Variant::kPhysical);
   for (std::uint32_t i = 0; i < 1000; ++i) {
     Draws draws(5, Stream::kLight, 0, i);
-    const Brdf::Sample s = brdf.sample(tilted(50.0), draws);
+    const Brdf::Sample s = drawn(brdf, tilted(50.0), draws);
     ASSERT_NEAR(s.weight, 0.3, 1e-12);
   }
 }
@@ -376,7 +384,7 @@ TEST(BrdfSample, SurvivesEveryViewDownToTheHorizon) {
       for (const double deg : {0.0, 89.9, 89.9999, 89.99999, 90.0, 91.0}) {
         for (std::uint32_t i = 0; i < 2000; ++i) {
           Draws draws(13, Stream::kLight, 0, i);
-          const Brdf::Sample s = brdf.sample(tilted(deg), draws);
+          const Brdf::Sample s = drawn(brdf, tilted(deg), draws);
           ASSERT_TRUE(s.in.allFinite()) << deg;
           ASSERT_TRUE(std::isfinite(s.weight) && s.weight >= 0.0) << deg;
         }
