@@ -63,7 +63,9 @@ BouncedLight::Question BouncedLight::arrive(const LampCones& lamps, Path& path,
   if (!(both > 0.0)) return {};
   const std::size_t lamp = path.numbers.pair(lamp_pair)[0] < path.sun_chance ? 0 : 1;
   const LampCone& cone = lamps[lamp];
-  const Vector3d toward = cone.parallel() ? cone.axis() : cone.sample(path.numbers.pair(disc_pair));
+  const Vector3d toward = cone.parallel()
+                              ? cone.axis()
+                              : Vector3d(cone.sample(path.numbers.pair(disc_pair)).cast<double>());
   if (!rules_.exact_caustics)
     return {toward.cast<float>(), both * static_cast<double>(path.weight)};
 

@@ -120,7 +120,8 @@ double Facets::reflected(const Facet& facet, double side, const LampCone& lamp,
                             .normalized();
       }
       for (int k = 0; k < each; ++k)
-        sum += with(smooth, disc ? lamp.sample(even_point(point++)) : lamp.axis());
+        sum += with(smooth,
+                    disc ? Vector3d(lamp.sample(even_point(point++)).cast<double>()) : lamp.axis());
     }
   }
   return sum / (n * n * each);

@@ -31,7 +31,11 @@ class LampCone {
 
   [[nodiscard]] bool parallel() const noexcept { return !(one_minus_cos_ > 0.0); }
   [[nodiscard]] double half_angle_rad() const noexcept { return half_angle_rad_; }
+  [[nodiscard]] double one_minus_cos() const noexcept { return one_minus_cos_; }
   [[nodiscard]] const Eigen::Vector3d& axis() const noexcept { return axis_; }
+  /// Across the axis and each other.
+  [[nodiscard]] const Eigen::Vector3d& side_x() const noexcept { return x_; }
+  [[nodiscard]] const Eigen::Vector3d& side_y() const noexcept { return y_; }
   /// Across the beam.
   [[nodiscard]] double irradiance_w_m2() const noexcept { return irradiance_w_m2_; }
   /// Of the lamp's face. Pre: not parallel.
@@ -39,12 +43,13 @@ class LampCone {
     return irradiance_w_m2_ * density_inside();
   }
   /// Towards a place of the lamp, each as likely per solid angle.
-  [[nodiscard]] Eigen::Vector3d sample(const std::array<float, 2>& numbers) const noexcept {
-    if (parallel()) return axis_;
-    const double drop = one_minus_cos_ * static_cast<double>(numbers[0]);
-    const double across = std::sqrt(drop * (2.0 - drop));
-    const double turn = 2.0 * kPi * static_cast<double>(numbers[1]);
-    return (1.0 - drop) * axis_ + across * (std::cos(turn) * x_ + std::sin(turn) * y_);
+  [[nodiscard]] Eigen::Vector3f sample(const std::array<float, 2>& numbers) const noexcept {
+    if (parallel()) return axis_.cast<float>();
+    const float drop = static_cast<float>(one_minus_cos_) * numbers[0];
+    const float across = std::sqrt(drop * (2.0F - drop));
+    const float turn = static_cast<float>(2.0 * kPi) * numbers[1];
+    return ((1.0F - drop) * axis_.cast<float>() + across * std::cos(turn) * x_.cast<float>()) +
+           across * std::sin(turn) * y_.cast<float>();
   }
   /// Of sample(), per steradian; 0 beside the lamp. Pre: not parallel.
   [[nodiscard]] double density(const Eigen::Vector3d& toward) const noexcept {

@@ -48,39 +48,30 @@ void RowTracer::begin(const TracedFrame& frame, int columns, int side, int repli
 void RowTracer::trace(int column, PixelPoint pixel, std::span<const std::uint32_t> keys, int first,
                       int last) noexcept {
   const int cells = side_ * side_;
-  const double share = bounced_.bounces() > 0 ? rules_.bounce_share : 0.0;
-  // In double up to the target; what a ray differs by within a pixel is small, and single is
-  // enough.
-  const Vector3d corner =
-      frame_->at_zero + (pixel.u - 0.5) * frame_->per_u + (pixel.v - 0.5) * frame_->per_v;
-  const Vector3f start = (frame_->origin + frame_->advance * corner).cast<float>();
-  const Vector3f direction = corner.cast<float>();
-  const Vector3f start_u = (frame_->advance * frame_->per_u).cast<float>();
-  const Vector3f start_v = (frame_->advance * frame_->per_v).cast<float>();
-  const Vector3f per_u = frame_->per_u.cast<float>();
-  const Vector3f per_v = frame_->per_v.cast<float>();
-  const float cell_px = 1.0F / static_cast<float>(side_);
+  // In 2^-32, so that no rounding makes the share another one.
+  const auto share = static_cast<std::uint64_t>(
+      std::llround(0x1p32 * (bounced_.bounces() > 0 ? rules_.bounce_share : 0.0)));
+  CameraQueue& q = camera_;
   for (int r = 0; r < replicates_; ++r) {
     const std::uint32_t key = keys[at(r)];
     // Which samples bounce: every (1/share)-th, from a place by chance.
-    const double begin = static_cast<double>(fraction(key));
-    for (int i = first; i < last; ++i) {
-      for (int cell = 0; cell < cells; ++cell) {
-        const int sample = i * cells + cell;
-        const double rank = std::floor(begin + sample * share);
-        const bool bounces = std::floor(begin + (sample + 1) * share) > rank;
-        const auto cell_key = static_cast<std::uint32_t>(mixed(key + at(cell)));
-        const auto place =
-            SampleNumbers(rules_.sequence, cell_key, static_cast<std::uint32_t>(i)).first_pair();
-        const float u = (static_cast<float>(cell % side_) + place[0]) * cell_px;
-        const float v = (static_cast<float>(cell / side_) + place[1]) * cell_px;
-        CameraQueue& q = camera_;
-        q.rays.set(q.used, start + u * start_u + v * start_v, direction + u * per_u + v * per_v);
+    const std::uint64_t begin = mixed32(key);
+    for (int cell = 0; cell < cells; ++cell) {
+      const std::uint32_t place_key = mixed32(key + 0x9E3779B9U * static_cast<std::uint32_t>(cell));
+      for (int i = first; i < last; ++i) {
+        const auto sample = static_cast<std::uint32_t>(i * cells + cell);
+        const std::uint64_t rank = (begin + sample * share) >> 32U;
+        const bool bounces = (begin + (sample + 1U) * share) >> 32U > rank;
+        if (q.used == 0) q.corner = {pixel.u - 0.5, pixel.v - 0.5};
         const std::size_t lane = at(q.used);
+        q.place_key[lane] = place_key;
+        q.place[lane] = static_cast<std::uint32_t>(i);
+        q.cell_u[lane] = static_cast<float>((pixel.u - 0.5 - q.corner.u) * side_ + cell % side_);
+        q.cell_v[lane] = static_cast<float>(cell / side_);
         q.slot[lane] = static_cast<std::uint32_t>(slot(column, cell, r));
         q.cell[lane] = static_cast<std::uint32_t>(column * cells + cell);
         q.key[lane] = key;
-        q.sample[lane] = static_cast<std::uint32_t>(sample);
+        q.sample[lane] = sample;
         q.bouncing[lane] = bounces ? static_cast<std::int32_t>(rank) : -1;
         if (++q.used == RayPacket::kLanes) send_camera_rays();
       }
@@ -88,44 +79,81 @@ void RowTracer::trace(int column, PixelPoint pixel, std::span<const std::uint32_
   }
 }
 
+/// Through the places of the samples in hand. In double up to the target; what rays of a packet
+/// differ by is small, and single precision is enough.
+void RowTracer::aim(RayPacket& rays) noexcept {
+  const CameraQueue& q = camera_;
+  const Vector3d corner = frame_->at_zero + q.corner.u * frame_->per_u + q.corner.v * frame_->per_v;
+  const double cell_px = 1.0 / side_;
+  const Vector3f start = (frame_->origin + frame_->advance * corner).cast<float>();
+  const Vector3f direction = corner.cast<float>();
+  const Vector3f start_u = (cell_px * frame_->advance * frame_->per_u).cast<float>();
+  const Vector3f start_v = (cell_px * frame_->advance * frame_->per_v).cast<float>();
+  const Vector3f per_u = (cell_px * frame_->per_u).cast<float>();
+  const Vector3f per_v = (cell_px * frame_->per_v).cast<float>();
+  SampleLanes lanes;
+  lanes.places(rules_.sequence, q.place_key, q.place);
+  for (std::size_t i = 0; i < kLanes; ++i) {
+    const float u = q.cell_u[i] + lanes.first[i];
+    const float v = q.cell_v[i] + lanes.second[i];
+    rays.origin_x[i] = start.x() + u * start_u.x() + v * start_v.x();
+    rays.origin_y[i] = start.y() + u * start_u.y() + v * start_v.y();
+    rays.origin_z[i] = start.z() + u * start_u.z() + v * start_v.z();
+    rays.direction_x[i] = direction.x() + u * per_u.x() + v * per_v.x();
+    rays.direction_y[i] = direction.y() + u * per_u.y() + v * per_v.y();
+    rays.direction_z[i] = direction.z() + u * per_u.z() + v * per_v.z();
+  }
+}
+
 void RowTracer::send_camera_rays() noexcept {
+  RayPacket rays;
+  aim(rays);
   const auto used = at(std::exchange(camera_.used, 0));
-  for (std::size_t i = used; i < kLanes; ++i) camera_.rays.active[i] = false;
+  std::fill_n(rays.active.begin(), used, true);
   std::array<MeshHit, kLanes> hits;
-  target_.scene.intersect(camera_.rays, hits, counts_[0], RayCoherence::kParallel);
+  target_.scene.intersect(rays, hits, counts_[0], RayCoherence::kParallel);
+  std::array<SurfacePoint, kLanes> points;
+  bool any = false;
   for (std::size_t i = 0; i < used; ++i) {
     if (hits[i].triangle == MeshHit::kNone) continue;
+    any = true;
     ++hits_;
     ++covered_[camera_.cell[i]];
-    const auto& light = target_.facets.radiance(hits[i].triangle);
-    const bool bounces = camera_.bouncing[i] >= 0;
-    if (!bounces && light[0] <= 0.0F && light[1] <= 0.0F) continue;
-    const Vector3f direction(camera_.rays.direction_x[i], camera_.rays.direction_y[i],
-                             camera_.rays.direction_z[i]);
-    const SurfacePoint point = target_.facets.at(hits[i], direction);
-    light_directly(i, point, hits[i].triangle);
-    if (!bounces) continue;
-    waiting_[paths_++] = {{point, direction.normalized(),
+    const Vector3f direction(rays.direction_x[i], rays.direction_y[i], rays.direction_z[i]);
+    points[i] = target_.facets.at(hits[i], direction);
+    if (camera_.bouncing[i] < 0) continue;
+    waiting_[paths_++] = {{points[i], direction.normalized(),
                            SampleNumbers(rules_.sequence, camera_.key[i],
                                          static_cast<std::uint32_t>(camera_.bouncing[i]))},
                           camera_.slot[i]};
   }
+  if (!any) return;
+  light_directly(points, hits);
   while (paths_ >= kLanes) bounce(kLanes);
 }
 
-void RowTracer::light_directly(std::size_t lane, const SurfacePoint& point,
-                               std::uint32_t facet) noexcept {
-  const auto& light = target_.facets.radiance(facet);
+void RowTracer::light_directly(const std::array<SurfacePoint, kLanes>& points,
+                               const std::array<MeshHit, kLanes>& hits) noexcept {
   for (std::size_t k = 0; k < kLamps; ++k) {
-    if (light[k] <= 0.0F) continue;
     const LampCone& lamp = frame_->lamps[k];
-    const Vector3d toward =
-        lamp.parallel()
-            ? lamp.axis()
-            : lamp.sample(SampleNumbers(rules_.sequence, camera_.key[lane], camera_.sample[lane])
-                              .pair(BouncedLight::kDirectDisc));
-    ask(direct_[k], RayCoherence::kParallel, counts_[1], point, toward.cast<float>(),
-        camera_.slot[lane], static_cast<double>(light[k]));
+    if (!(lamp.irradiance_w_m2() > 0.0)) continue;
+    RayPacket toward;
+    if (!lamp.parallel()) {
+      SampleLanes lanes;
+      lanes.pairs(rules_.sequence, camera_.key, camera_.sample, BouncedLight::kDirectDisc);
+      lanes.towards(lamp, toward);
+    }
+    const Vector3f axis = lamp.axis().cast<float>();
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      if (hits[i].triangle == MeshHit::kNone) continue;
+      const float light = target_.facets.radiance(hits[i].triangle)[k];
+      if (light <= 0.0F) continue;
+      const Vector3f way = lamp.parallel() ? axis
+                                           : Vector3f(toward.direction_x[i], toward.direction_y[i],
+                                                      toward.direction_z[i]);
+      ask(direct_[k], RayCoherence::kParallel, counts_[1], points[i], way, camera_.slot[i],
+          static_cast<double>(light));
+    }
   }
 }
 

@@ -4,6 +4,7 @@
 
 #include "engine/render/bounced_light.h"
 #include "engine/render/renderer.h"
+#include "engine/render/sample_lanes.h"
 #include "engine/scene/camera_geometry.h"
 
 namespace engine {
@@ -62,14 +63,18 @@ class RowTracer {
  private:
   static constexpr std::size_t kLanes = RayPacket::kLanes;
 
-  /// Rays of the camera, and what they are for.
+  /// Samples of the camera, and what they are for.
   struct CameraQueue {
-    RayPacket rays;
-    std::array<std::uint32_t, kLanes> slot{};
-    std::array<std::uint32_t, kLanes> cell{};
-    std::array<std::uint32_t, kLanes> key{};
-    std::array<std::uint32_t, kLanes> sample{};   // of the replicate's, in the pixel
+    SampleLanes::Words place_key{};
+    SampleLanes::Words place{};  // which of the cell's
+    SampleLanes::Numbers cell_u{};
+    SampleLanes::Numbers cell_v{};
+    SampleLanes::Words slot{};
+    SampleLanes::Words cell{};
+    SampleLanes::Words key{};
+    SampleLanes::Words sample{};                  // of the replicate's, in the pixel
     std::array<std::int32_t, kLanes> bouncing{};  // which of those that bounce; -1: it does not
+    PixelPoint corner;  // that cells are counted from: the first one's pixel
     int used = 0;
   };
   struct ShadowQueue {
@@ -86,8 +91,10 @@ class RowTracer {
   [[nodiscard]] std::size_t slot(int column, int cell, int replicate) const noexcept {
     return static_cast<std::size_t>((column * side_ * side_ + cell) * replicates_ + replicate);
   }
+  void aim(RayPacket& rays) noexcept;
   void send_camera_rays() noexcept;
-  void light_directly(std::size_t lane, const SurfacePoint& point, std::uint32_t facet) noexcept;
+  void light_directly(const std::array<SurfacePoint, kLanes>& points,
+                      const std::array<MeshHit, kLanes>& hits) noexcept;
   void ask(ShadowQueue& queue, RayCoherence coherence, RayCounts& counts, const SurfacePoint& from,
            const Eigen::Vector3f& toward, std::uint32_t slot, double light) noexcept;
   void send(ShadowQueue& queue, RayCoherence coherence, RayCounts& counts) noexcept;

@@ -17,7 +17,8 @@ namespace engine {
 enum class SequenceKind : std::uint8_t { kSobol, kIndependent };
 
 [[nodiscard]] constexpr std::uint32_t reversed_bits(std::uint32_t x) noexcept {
-  x = __builtin_bswap32(x);
+  x = (x >> 16U) | (x << 16U);
+  x = ((x >> 8U) & 0x00FF00FFU) | ((x & 0x00FF00FFU) << 8U);
   x = ((x >> 4U) & 0x0F0F0F0FU) | ((x & 0x0F0F0F0FU) << 4U);
   x = ((x >> 2U) & 0x33333333U) | ((x & 0x33333333U) << 2U);
   return ((x >> 1U) & 0x55555555U) | ((x & 0x55555555U) << 1U);
@@ -63,8 +64,58 @@ enum class SequenceKind : std::uint8_t { kSobol, kIndependent };
 
 /// In (0, 1): the middle of one of 2^24 cells.
 [[nodiscard]] constexpr float fraction(std::uint32_t bits) noexcept {
-  return (static_cast<float>(bits >> 8U) + 0.5F) * 0x1p-24F;
+  return (static_cast<float>(static_cast<std::int32_t>(bits >> 8U)) + 0.5F) * 0x1p-24F;
 }
+
+/// 32 bits of which each depends on every bit of `x` (the end of MurmurHash3, Appleby 2011).
+[[nodiscard]] constexpr std::uint32_t mixed32(std::uint32_t x) noexcept {
+  x ^= x >> 16U;
+  x *= 0x85EBCA6BU;
+  x ^= x >> 13U;
+  x *= 0xC2B2AE35U;
+  return x ^ (x >> 16U);
+}
+
+/// What scrambles a pair: its numbers, and the order of its points.
+struct PairSeeds {
+  std::uint32_t first = 0;
+  std::uint32_t second = 0;
+  std::uint32_t order = 0;
+};
+[[nodiscard]] constexpr PairSeeds seeds_of_pair(std::uint32_t key, std::uint32_t number) noexcept {
+  const std::uint32_t seed = mixed32(key + number * 0x9E3779B9U);
+  return {seed, (seed ^ (seed >> 15U)) * 0x2C1B3C6DU, (seed ^ (seed >> 14U)) * 0x297A2D39U};
+}
+[[nodiscard]] constexpr PairSeeds seeds_of_places(std::uint32_t key) noexcept {
+  return seeds_of_pair(key, 0xFFFFFFFFU);
+}
+[[nodiscard]] constexpr std::array<float, 2> scrambled_pair(std::uint32_t index,
+                                                            const PairSeeds& seeds) noexcept {
+  const auto point = sobol_reversed(index);
+  return {fraction(reversed_bits(scrambled_upwards(point[0], seeds.first))),
+          fraction(reversed_bits(scrambled_upwards(point[1], seeds.second)))};
+}
+[[nodiscard]] constexpr std::array<float, 2> independent_pair(std::uint32_t key,
+                                                              std::uint32_t sample,
+                                                              std::uint32_t number) noexcept {
+  const std::uint64_t bits = mixed(mixed(static_cast<std::uint64_t>(key) << 32U | number) ^ sample);
+  return {fraction(static_cast<std::uint32_t>(bits)),
+          fraction(static_cast<std::uint32_t>(bits >> 32U))};
+}
+
+/// Pairs in (0, 1) in Sobol's own order: the first 2^k are a net.
+class PlaceSequence {
+ public:
+  PlaceSequence(SequenceKind kind, std::uint32_t key) noexcept : kind_(kind), key_(key) {}
+  [[nodiscard]] std::array<float, 2> at(std::uint32_t sample) const noexcept {
+    if (kind_ == SequenceKind::kIndependent) return independent_pair(key_, sample, 0xFFFFFFFFU);
+    return scrambled_pair(sample, seeds_of_places(key_));
+  }
+
+ private:
+  SequenceKind kind_;
+  std::uint32_t key_;
+};
 
 /// The numbers of one sample of a sequence: pairs in (0, 1), a function of (key, sample, pair).
 class SampleNumbers {
@@ -74,31 +125,10 @@ class SampleNumbers {
       : kind_(kind), key_(key), sample_(sample) {}
 
   [[nodiscard]] std::array<float, 2> pair(std::uint32_t number) const noexcept {
-    const std::uint64_t seed = mixed(static_cast<std::uint64_t>(key_) << 32U | number);
-    if (kind_ == SequenceKind::kIndependent) {
-      const std::uint64_t bits = mixed(seed ^ sample_);
-      return {fraction(static_cast<std::uint32_t>(bits)),
-              fraction(static_cast<std::uint32_t>(bits >> 32U))};
-    }
-    const auto low = static_cast<std::uint32_t>(seed);
-    const auto high = static_cast<std::uint32_t>(seed >> 32U);
+    if (kind_ == SequenceKind::kIndependent) return independent_pair(key_, sample_, number);
     // Another order for each pair: else the n-th points of two pairs would belong together.
-    const auto point = sobol_reversed(owen_scrambled(sample_, low ^ (high * 0x9E3779B9U)));
-    return {fraction(reversed_bits(scrambled_upwards(point[0], low))),
-            fraction(reversed_bits(scrambled_upwards(point[1], high)))};
-  }
-  /// The pair of a sequence of its own, in Sobol's order.
-  [[nodiscard]] std::array<float, 2> first_pair() const noexcept {
-    const std::uint64_t seed = mixed(key_);
-    if (kind_ == SequenceKind::kIndependent) {
-      const std::uint64_t bits = mixed(seed ^ sample_);
-      return {fraction(static_cast<std::uint32_t>(bits)),
-              fraction(static_cast<std::uint32_t>(bits >> 32U))};
-    }
-    const auto point = sobol_reversed(sample_);
-    return {fraction(reversed_bits(scrambled_upwards(point[0], static_cast<std::uint32_t>(seed)))),
-            fraction(reversed_bits(
-                scrambled_upwards(point[1], static_cast<std::uint32_t>(seed >> 32U))))};
+    const PairSeeds seeds = seeds_of_pair(key_, number);
+    return scrambled_pair(owen_scrambled(sample_, seeds.order), seeds);
   }
 
  private:

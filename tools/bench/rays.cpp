@@ -2,6 +2,8 @@
 // path tracer beside the sum of its rays, each at Embree's best rate for its kind.
 //   build/release/bench_rays                  the built-in telescope
 //   build/release/bench_rays hubble.obj 100   any mesh, so many pixels across
+//   build/release/bench_rays hubble.obj 100 50   the path tracer alone, so many frames: for a
+//   profiler
 // CPU time, the least of several rounds taken in turn: other programs then count for little.
 #include <algorithm>
 #include <cstdio>
@@ -54,6 +56,10 @@ Snapshot view_of(double range_m) {
   s.sun = {direction_of<BodyFrame>({0.9, 0.1, -0.5}), 630.0};
   s.earthshine = {direction_of<BodyFrame>({0.0, 0.1, 1.0}), 40.0};
   return s;
+}
+
+double range_for(const TracedTarget& target, const CameraGeometry& camera, double pixels_across) {
+  return 2.0 * target.bounding_radius_m / (pixels_across * camera.ifov_rad());
 }
 
 /// Rays in packets, in the order in which a renderer would have them.
@@ -157,6 +163,21 @@ Rates rates_of(const char* name, const BareEmbree& bare, const EmbreeScene& scen
   return rates;
 }
 
+void render_only(const Mesh& mesh, const std::vector<Material>& materials, double pixels_across,
+                 int frames) {
+  const auto target = std::make_shared<TracedTarget>(mesh, materials);
+  RenderSpec spec;
+  spec.samples_per_pixel = kSamples;
+  spec.grid.beyond_frame_px = 16;
+  const Snapshot snapshot = view_of(range_for(*target, spec.camera, pixels_across));
+  WorkerPool pool(1);
+  PathTracer tracer(spec, target, pool);
+  Radiance out;
+  const double start = cpu_s();
+  for (int i = 0; i < frames; ++i) static_cast<void>(tracer.render(snapshot, {}, out));
+  std::printf("%.3f CPU-ms a frame\n", (cpu_s() - start) / frames * 1e3);
+}
+
 void compare(const char* name, const Mesh& mesh, const std::vector<Material>& materials,
              double pixels_across) {
   const auto target = std::make_shared<TracedTarget>(mesh, materials);
@@ -230,6 +251,10 @@ int main(int argc, char** argv) {
     if (argc > 1) {
       MeshReport report;
       const Mesh mesh = load_obj(argv[1], report);
+      if (argc > 3) {
+        render_only(mesh, lambert_for(mesh), pixels, std::atoi(argv[3]));
+        return 0;
+      }
       compare("mesh, Lambert .5", mesh, lambert_for(mesh), pixels);
       return 0;
     }
