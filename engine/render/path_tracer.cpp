@@ -14,6 +14,8 @@ std::size_t at(int i) noexcept { return static_cast<std::size_t>(i); }
 
 // No pixel gets more: a rare light must not take all of a frame's time.
 constexpr int kMostSamples = 1 << 16;
+// A pilot knows the noise to come this well; rare light it has not seen.
+constexpr double kPilotTrust = 0.9;
 // A shadow's edge narrower than this, in pixels, is as good as hard.
 constexpr double kHardEdge_px = 0.2;
 
@@ -132,7 +134,7 @@ void PathTracer::choose_samples(const TracedFrame& frame, const Snapshot& snapsh
   }
   replicates_used_ = kReplicates;
   pool_.rows(0, region.height(), [&](int row) { pilot_row(frame, snapshot, region, row); });
-  const double limit = budget.rho_mc > 0.0 ? budget.rho_mc : spec_.profile.rho_mc;
+  const double limit = kPilotTrust * (budget.rho_mc > 0.0 ? budget.rho_mc : spec_.profile.rho_mc);
   const int least = side * side * kReplicates;
   noise_.plan({limit, least, kMostSamples}, region, mean_, variance_, wanted_);
   for (std::size_t i = 0; i < pixels; ++i)

@@ -62,9 +62,9 @@ enum class SequenceKind : std::uint8_t { kSobol, kIndependent };
   return x ^ (x >> 31U);
 }
 
-/// In (0, 1): the middle of one of 2^24 cells.
+/// In (0, 1): the middle of one of 2^23 cells, exact in single precision.
 [[nodiscard]] constexpr float fraction(std::uint32_t bits) noexcept {
-  return (static_cast<float>(static_cast<std::int32_t>(bits >> 8U)) + 0.5F) * 0x1p-24F;
+  return (static_cast<float>(static_cast<std::int32_t>(bits >> 9U)) + 0.5F) * 0x1p-23F;
 }
 
 /// 32 bits of which each depends on every bit of `x` (the end of MurmurHash3, Appleby 2011).
