@@ -2,6 +2,7 @@
 
 #include <Random123/philox.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -47,9 +48,10 @@ class Draws {
     }
     return block_[next_++];
   }
-  /// In (0, 1): the middle of one of 2^24 cells, exact in single precision.
+  /// In (0, 1): the middle of one of 2^24 cells, as near as single precision has it. The last
+  /// cell's would be rounded to 1.
   [[nodiscard]] float uniform() noexcept {
-    return (static_cast<float>(bits() >> 8) + 0.5F) * 0x1p-24F;
+    return std::min((static_cast<float>(bits() >> 8) + 0.5F) * 0x1p-24F, 0x1.fffffep-1F);
   }
   /// In (0, 1), 2^53 cells.
   [[nodiscard]] double uniform_double() noexcept {

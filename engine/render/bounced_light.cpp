@@ -1,51 +1,101 @@
 #include "engine/render/bounced_light.h"
 
+#include <algorithm>
+
 #include "engine/core/constants.h"
 
 namespace engine {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
+using Eigen::Vector3f;
 
-double BouncedLight::radiance(const Snapshot& snapshot, SurfacePoint from, Vector3d direction,
-                              Draws& draws, RayCounts& counts) const noexcept {
-  double radiance = 0;
-  double throughput = 1;
-  Matrix3d local = basis_round(from.normal.cast<double>());
-  Vector3d out = local * -direction;
-  for (int bounce = 1;; ++bounce) {
-    const Brdf::Sample next = target_.facets.brdf(from.material).sample(out, draws);
-    if (!(next.weight > 0.0)) break;
-    throughput *= next.weight;
-    direction = local.transpose() * next.in;
-    const MeshHit hit = target_.scene.intersect(from.start(), direction.cast<float>(), counts);
-    if (hit.triangle == MeshHit::kNone) break;
-    from = target_.facets.at(hit, direction.cast<float>());
-    radiance += throughput * scattered(snapshot, from, draws, counts);
-    if (bounce == bounces_) break;
-    local = basis_round(from.normal.cast<double>());
-    out = local * -direction;
-  }
-  return radiance;
+BouncedLight::BouncedLight(const TracedTarget& target, const BounceRules& rules)
+    : target_(target), rules_(rules) {
+  rules_.bounces = std::clamp(rules_.bounces, 0, kMostBounces);
 }
 
-double BouncedLight::scattered(const Snapshot& snapshot, const SurfacePoint& at, Draws& draws,
-                               RayCounts& counts) const noexcept {
-  const auto lamps = lamps_of(snapshot);
-  const Vector3d normal = at.normal.cast<double>();
+bool BouncedLight::go_on(Path& path) const noexcept {
+  if (longest(path)) return false;
+  const Matrix3d local = basis_round(path.from.normal.cast<double>());
+  const auto choice = path.numbers.pair(pair_of(path, kChoice));
+  const Brdf::Sample next = target_.facets.brdf(path.from.material)
+                                .sample(local * -path.direction.cast<double>(), rules_.sampler,
+                                        path.numbers.pair(pair_of(path, kDirection)), choice[0]);
+  if (!(next.weight > 0.0)) return false;
+  path.weight *= static_cast<float>(next.weight);
+  if (path.bounces > 0) {
+    const float chance = std::min(1.0F, path.weight);
+    if (choice[1] >= chance) return false;
+    path.weight /= chance;
+  }
+  path.direction = (local.transpose() * next.in).cast<float>();
+  path.density = static_cast<float>(next.density);
+  return true;
+}
+
+double BouncedLight::escaped(const LampCones& lamps, const Path& path) const noexcept {
+  const LampCone& sun = lamps[0];
+  // Where the path began the lamps' light is Facets'.
+  if (!rules_.exact_caustics || sun.parallel() || path.sun_chance <= 0.0F) return 0.0;
+  const double asked =
+      static_cast<double>(path.sun_chance) * sun.density(path.direction.cast<double>());
+  if (!(asked > 0.0)) return 0.0;
+  const auto met = static_cast<double>(path.density);
+  return static_cast<double>(path.weight) * sun.radiance_w_m2_sr() * met / (met + asked);
+}
+
+BouncedLight::Question BouncedLight::arrive(const LampCones& lamps, Path& path,
+                                            const SurfacePoint& place) const noexcept {
+  path.from = place;
+  const Brdf& brdf = target_.facets.brdf(place.material);
+  const Vector3d normal = place.normal.cast<double>();
   std::array<double, kLamps> light{};
   for (std::size_t k = 0; k < kLamps; ++k) {
-    const double cos_in = normal.dot(lamps[k]->toward.unit);
-    if (cos_in <= 0.0) continue;
-    light[k] =
-        lamps[k]->irradiance_w_m2 * cos_in * target_.facets.brdf(at.material).albedo(cos_in) / kPi;
+    const double cos_in = normal.dot(lamps[k].axis());
+    if (cos_in > 0.0) light[k] = lamps[k].irradiance_w_m2() * cos_in * brdf.albedo(cos_in) / kPi;
   }
   const double both = light[0] + light[1];
-  if (!(both > 0.0)) return 0.0;
-  const std::size_t lamp = static_cast<double>(draws.uniform()) * both < light[0] ? 0 : 1;
-  const bool hidden =
-      target_.scene.occluded(at.start(), lamps[lamp]->toward.unit.cast<float>(), counts);
-  return hidden ? 0.0 : both;
+  path.sun_chance = both > 0.0 ? static_cast<float>(light[0] / both) : 0.0F;
+  const std::uint32_t lamp_pair = pair_of(path, kLamp);
+  const std::uint32_t disc_pair = pair_of(path, kDisc);
+  ++path.bounces;
+  if (!(both > 0.0)) return {};
+  const std::size_t lamp = path.numbers.pair(lamp_pair)[0] < path.sun_chance ? 0 : 1;
+  const LampCone& cone = lamps[lamp];
+  const Vector3d toward = cone.parallel()
+                              ? cone.axis()
+                              : Vector3d(cone.sample(path.numbers.pair(disc_pair)).cast<double>());
+  if (!rules_.exact_caustics)
+    return {toward.cast<float>(), both * static_cast<double>(path.weight)};
+
+  const Matrix3d local = basis_round(normal);
+  const Vector3d in = local * toward;
+  if (!(in.z() > 0.0)) return {};
+  const Vector3d out = local * -path.direction.cast<double>();
+  double value = cone.irradiance_w_m2() * in.z() * brdf.eval(in, out) * both / light[lamp];
+  // The last place of a path asks, and nobody runs into the lamp from there.
+  if (!cone.parallel() && !longest(path)) {
+    const double asked = static_cast<double>(path.sun_chance) * cone.density(cone.axis());
+    value *= asked / (asked + brdf.pdf(in, out, rules_.sampler));
+  }
+  return {toward.cast<float>(), value * static_cast<double>(path.weight)};
+}
+
+double BouncedLight::radiance(const LampCones& lamps, const SurfacePoint& from,
+                              const Vector3f& direction, const SampleNumbers& numbers,
+                              RayCounts& counts) const noexcept {
+  Path path{from, direction, numbers};
+  double radiance = 0;
+  while (go_on(path)) {
+    const MeshHit hit = target_.scene.intersect(path.from.start(), path.direction, counts);
+    if (hit.triangle == MeshHit::kNone) return radiance + escaped(lamps, path);
+    const Question question = arrive(lamps, path, target_.facets.at(hit, path.direction));
+    if (question.light_w_m2_sr > 0.0 &&
+        !target_.scene.occluded(path.from.start(), question.toward, counts))
+      radiance += question.light_w_m2_sr;
+  }
+  return radiance;
 }
 
 }  // namespace engine

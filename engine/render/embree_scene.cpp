@@ -22,6 +22,15 @@ bool valid_ray(float ox, float oy, float oz, float dx, float dy, float dz) noexc
          std::abs(oz) < kLargestCoordinate_m && length2 > 0.25F && length2 < 4.0F;
 }
 
+/// The same as 1 or 0, every comparison made.
+int valid_lane(float ox, float oy, float oz, float dx, float dy, float dz) noexcept {
+  const float length2 = dx * dx + dy * dy + dz * dz;
+  return static_cast<int>(std::abs(ox) < kLargestCoordinate_m) &
+         static_cast<int>(std::abs(oy) < kLargestCoordinate_m) &
+         static_cast<int>(std::abs(oz) < kLargestCoordinate_m) & static_cast<int>(length2 > 0.25F) &
+         static_cast<int>(length2 < 4.0F);
+}
+
 bool start_ray(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction, RTCRay& ray,
                RayCounts& counts) noexcept {
   if (!valid_ray(origin.x(), origin.y(), origin.z(), direction.x(), direction.y(), direction.z())) {
@@ -44,26 +53,36 @@ bool start_ray(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction, 
 using LaneMask = std::array<int, RayPacket::kLanes>;  // -1 traces a lane, 0 leaves it out
 
 void start_rays(const RayPacket& rays, RTCRay16& out, LaneMask& mask, RayCounts& counts) noexcept {
+  // Without a branch: these loops run on all lanes at once.
+  alignas(64) std::array<int, RayPacket::kLanes> asked;
+  for (std::size_t i = 0; i < mask.size(); ++i) asked[i] = rays.active[i] ? 1 : 0;
+  int valid_rays = 0;
+  int asked_rays = 0;
   for (std::size_t i = 0; i < mask.size(); ++i) {
-    const bool valid =
-        rays.active[i] && valid_ray(rays.origin_x[i], rays.origin_y[i], rays.origin_z[i],
-                                    rays.direction_x[i], rays.direction_y[i], rays.direction_z[i]);
-    counts.rays += valid ? 1U : 0U;
-    counts.rejected += rays.active[i] && !valid ? 1U : 0U;
-    mask[i] = valid ? -1 : 0;
-    // Lanes that are left out still have to be numbers.
-    out.org_x[i] = valid ? rays.origin_x[i] : 0.0F;
-    out.org_y[i] = valid ? rays.origin_y[i] : 0.0F;
-    out.org_z[i] = valid ? rays.origin_z[i] : 0.0F;
-    out.dir_x[i] = valid ? rays.direction_x[i] : 0.0F;
-    out.dir_y[i] = valid ? rays.direction_y[i] : 0.0F;
-    out.dir_z[i] = valid ? rays.direction_z[i] : 1.0F;
+    const int valid =
+        asked[i] & valid_lane(rays.origin_x[i], rays.origin_y[i], rays.origin_z[i],
+                              rays.direction_x[i], rays.direction_y[i], rays.direction_z[i]);
+    valid_rays += valid;
+    asked_rays += asked[i];
+    mask[i] = -valid;
+  }
+  counts.rays += static_cast<std::uint64_t>(valid_rays);
+  counts.rejected += static_cast<std::uint64_t>(asked_rays - valid_rays);
+  // Lanes that are left out still have to be numbers.
+  const auto copy = [&mask](const RayPacket::Lanes& from, float* __restrict to, float otherwise) {
+    for (std::size_t i = 0; i < mask.size(); ++i) to[i] = mask[i] != 0 ? from[i] : otherwise;
+  };
+  copy(rays.origin_x, out.org_x, 0.0F);
+  copy(rays.origin_y, out.org_y, 0.0F);
+  copy(rays.origin_z, out.org_z, 0.0F);
+  copy(rays.direction_x, out.dir_x, 0.0F);
+  copy(rays.direction_y, out.dir_y, 0.0F);
+  copy(rays.direction_z, out.dir_z, 1.0F);
+  for (std::size_t i = 0; i < mask.size(); ++i) {
     out.tnear[i] = 0.0F;
     out.tfar[i] = kFar;
     out.time[i] = 0.0F;
     out.mask[i] = kAllGeometry;
-    out.id[i] = 0;
-    out.flags[i] = 0;
   }
 }
 
@@ -72,6 +91,11 @@ RTCIntersectContext context_for(RTCIntersectContextFlags flags) noexcept {
   rtcInitIntersectContext(&context);
   context.flags = flags;
   return context;
+}
+
+RTCIntersectContextFlags flag_of(RayCoherence coherence) noexcept {
+  return coherence == RayCoherence::kParallel ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT
+                                              : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
 }
 
 /// One for all scenes of the process, and never released: letting go of the last one would have the
@@ -142,12 +166,12 @@ bool EmbreeScene::occluded(const Eigen::Vector3f& origin, const Eigen::Vector3f&
 }
 
 void EmbreeScene::intersect(const RayPacket& rays, std::array<MeshHit, RayPacket::kLanes>& hits,
-                            RayCounts& counts) const noexcept {
+                            RayCounts& counts, RayCoherence coherence) const noexcept {
   RTCRayHit16 query;
   alignas(64) LaneMask mask;
   start_rays(rays, query.ray, mask, counts);
   std::fill(std::begin(query.hit.geomID), std::end(query.hit.geomID), RTC_INVALID_GEOMETRY_ID);
-  RTCIntersectContext context = context_for(RTC_INTERSECT_CONTEXT_FLAG_COHERENT);
+  RTCIntersectContext context = context_for(flag_of(coherence));
   rtcIntersect16(mask.data(), handles_->scene, &context, &query);
   for (std::size_t i = 0; i < hits.size(); ++i) {
     const bool hit = mask[i] != 0 && query.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
@@ -156,11 +180,11 @@ void EmbreeScene::intersect(const RayPacket& rays, std::array<MeshHit, RayPacket
 }
 
 void EmbreeScene::occluded(const RayPacket& rays, std::array<bool, RayPacket::kLanes>& blocked,
-                           RayCounts& counts) const noexcept {
+                           RayCounts& counts, RayCoherence coherence) const noexcept {
   RTCRay16 query;
   alignas(64) LaneMask mask;
   start_rays(rays, query, mask, counts);
-  RTCIntersectContext context = context_for(RTC_INTERSECT_CONTEXT_FLAG_COHERENT);
+  RTCIntersectContext context = context_for(flag_of(coherence));
   rtcOccluded16(mask.data(), handles_->scene, &context, &query);
   for (std::size_t i = 0; i < blocked.size(); ++i)
     blocked[i] = mask[i] != 0 && query.tfar[i] < 0.0F;

@@ -28,6 +28,9 @@ struct alignas(64) RayPacket {
   }
 };
 
+/// Whether the rays of a packet lie close together. It changes their speed, not what they meet.
+enum class RayCoherence : std::uint8_t { kParallel, kScattered };
+
 /// Where a ray meets the mesh: a triangle, and weights of its second and third corner.
 struct MeshHit {
   static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
@@ -59,11 +62,12 @@ class EmbreeScene {
   [[nodiscard]] bool occluded(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction,
                               RayCounts& counts) const noexcept;
 
-  /// Rays that lie close together, four times as fast as one by one.
+  /// Three to four times as fast as one by one.
   void intersect(const RayPacket& rays, std::array<MeshHit, RayPacket::kLanes>& hits,
-                 RayCounts& counts) const noexcept;
+                 RayCounts& counts,
+                 RayCoherence coherence = RayCoherence::kParallel) const noexcept;
   void occluded(const RayPacket& rays, std::array<bool, RayPacket::kLanes>& blocked,
-                RayCounts& counts) const noexcept;
+                RayCounts& counts, RayCoherence coherence = RayCoherence::kParallel) const noexcept;
 
  private:
   struct Handles;

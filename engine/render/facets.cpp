@@ -20,6 +20,18 @@ constexpr float kFlat_rad = 1e-3F;
 // Beyond so many half widths from its top the lobe is at .2 % (polyimide of table 3), or less.
 constexpr double kLobeReach = 11.0;
 constexpr int kMostSteps = 48;
+// The disc of the Sun shows where the half vector is this near to the lobe, in its half widths, and
+// in none so wide, in radii of the disc.
+constexpr double kDiscReach = 2.0;
+constexpr double kDiscFades = 10.0;
+constexpr int kDiscPoints = 32;
+
+/// The i-th of any number of points that fill the square evenly: R2 (Roberts 2018).
+std::array<float, 2> even_point(int i) noexcept {
+  const double u = 0.5 + 0.7548776662466927 * i;
+  const double v = 0.5 + 0.5698402909980532 * i;
+  return {static_cast<float>(u - std::floor(u)), static_cast<float>(v - std::floor(v))};
+}
 
 }  // namespace
 
@@ -58,60 +70,74 @@ Facets::Facets(const Mesh& mesh, std::vector<Brdf> brdfs)
   }
 }
 
-void Facets::light_up(const Snapshot& snapshot, WorkerPool& pool) noexcept {
+void Facets::light_up(const Snapshot& snapshot, WorkerPool& pool, double sun_radius_rad) noexcept {
   const int count = static_cast<int>(facets_.size());
+  const LampCones lamps = lamp_cones(snapshot, sun_radius_rad);
   pool.rows(0, (count + kFacetsAShare - 1) / kFacetsAShare, [&](int share) {
     const int last = std::min(count, (share + 1) * kFacetsAShare);
     for (int i = share * kFacetsAShare; i < last; ++i)
-      light_facet(snapshot, static_cast<std::size_t>(i));
+      light_facet(snapshot, lamps, static_cast<std::size_t>(i));
   });
 }
 
-double Facets::reflected(const Facet& facet, double side, const Vector3d& to_lamp,
+double Facets::reflected(const Facet& facet, double side, const LampCone& lamp,
                          const Vector3d& to_camera) const noexcept {
   const Brdf& brdf = brdfs_[facet.material];
-  const auto with_normal = [&](const Vector3d& normal) {
+  const auto with = [&](const Vector3d& normal, const Vector3d& to_lamp) {
     const Matrix3d local = basis_round(normal);
     const Vector3d in = local * to_lamp;
     return in.z() > 0.0 ? brdf.eval(in, local * to_camera) * in.z() : 0.0;
   };
   const Vector3d normal = side * facet.normal.cast<double>();
   const double width_rad = brdf.lobe_half_width_rad();
-  const double off_mirror = angle_between_rad(normal, to_lamp + to_camera);
-  if (facet.spread_rad < kFlat_rad || width_rad == 0.0 ||
-      off_mirror > static_cast<double>(facet.spread_rad) + kLobeReach * width_rad) {
-    return with_normal(normal);
-  }
-  // The mean over the middles of n^2 small triangles that the facet is cut into.
-  const double steps = 2.0 * static_cast<double>(facet.spread_rad) / width_rad;
+  if (width_rad == 0.0) return with(normal, lamp.axis());
+  const double off_mirror = angle_between_rad(normal, lamp.axis() + to_camera);
+  const auto spread = static_cast<double>(facet.spread_rad);
+  const bool curved =
+      facet.spread_rad >= kFlat_rad && off_mirror <= spread + kLobeReach * width_rad;
+  const double radius_rad = lamp.half_angle_rad();
+  const bool disc = width_rad < kDiscFades * radius_rad &&
+                    off_mirror <= spread + 0.5 * radius_rad + kDiscReach * width_rad;
+  if (!curved && !disc) return with(normal, lamp.axis());
+  // The mean over the middles of n^2 small triangles that the facet is cut into, and over points of
+  // the disc: each triangle has its own, the more the fewer there are.
+  const double steps = curved ? 2.0 * spread / width_rad : 1.0;
   const int n = static_cast<int>(std::clamp(std::ceil(steps), 1.0, 1.0 * kMostSteps));
+  const int each = disc ? (kDiscPoints + n * n - 1) / (n * n) : 1;
   double sum = 0;
+  int point = 0;
   for (int i = 0; i < n; ++i) {
     for (int j = 0; j < 2 * (n - i) - 1; ++j) {
       const int column = j / 2;
       const double middle = (j % 2 == 0 ? 1.0 : 2.0) / 3.0;  // of the two triangles of a square
       const double third = (i + middle) / n;
       const double second = (column + middle) / n;
-      const Vector3d smooth = (1.0 - second - third) * facet.normals[0].cast<double>() +
-                              second * facet.normals[1].cast<double>() +
-                              third * facet.normals[2].cast<double>();
-      sum += with_normal(side * smooth.normalized());
+      Vector3d smooth = normal;
+      if (curved) {
+        smooth = side * ((1.0 - second - third) * facet.normals[0].cast<double>() +
+                         second * facet.normals[1].cast<double>() +
+                         third * facet.normals[2].cast<double>())
+                            .normalized();
+      }
+      for (int k = 0; k < each; ++k)
+        sum += with(smooth,
+                    disc ? Vector3d(lamp.sample(even_point(point++)).cast<double>()) : lamp.axis());
     }
   }
-  return sum / (n * n);
+  return sum / (n * n * each);
 }
 
-void Facets::light_facet(const Snapshot& snapshot, std::size_t index) noexcept {
+void Facets::light_facet(const Snapshot& snapshot, const LampCones& lamps,
+                         std::size_t index) noexcept {
   const Facet& facet = facets_[index];
   radiance_[index] = {};
   const Vector3d middle = (facet.corner + (facet.edge1 + facet.edge2) / 3.0F).cast<double>();
   const Vector3d to_camera = (snapshot.camera.m - middle).normalized();
   const double side = facet.normal.cast<double>().dot(to_camera) >= 0.0 ? 1.0 : -1.0;
-  const auto lamps = lamps_of(snapshot);
   for (std::size_t k = 0; k < kLamps; ++k) {
-    if (!(lamps[k]->irradiance_w_m2 > 0.0)) continue;
-    radiance_[index][k] = static_cast<float>(
-        lamps[k]->irradiance_w_m2 * reflected(facet, side, lamps[k]->toward.unit, to_camera));
+    if (!(lamps[k].irradiance_w_m2() > 0.0)) continue;
+    radiance_[index][k] = static_cast<float>(lamps[k].irradiance_w_m2() *
+                                             reflected(facet, side, lamps[k], to_camera));
   }
 }
 

@@ -2,25 +2,37 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <utility>
+
+#include "engine/core/random.h"
 
 namespace engine {
 namespace {
 
-using Eigen::Matrix3d;
-using Eigen::Vector3d;
-using Eigen::Vector3f;
-
-constexpr std::size_t kLanes = RayPacket::kLanes;
-
 std::size_t at(int i) noexcept { return static_cast<std::size_t>(i); }
 
-/// The i-th point of a sequence that fills the square evenly: R2 (Roberts 2018), randomly shifted.
-PixelPoint spread_point(int i, float shift_u, float shift_v) noexcept {
-  constexpr double kPlastic1 = 0.7548776662466927;
-  constexpr double kPlastic2 = 0.5698402909980532;
-  const double u = static_cast<double>(shift_u) + kPlastic1 * i;
-  const double v = static_cast<double>(shift_v) + kPlastic2 * i;
-  return {u - std::floor(u), v - std::floor(v)};
+// No pixel gets more: a rare light must not take all of a frame's time.
+constexpr int kMostSamples = 1 << 16;
+// A pilot knows the noise to come this well; rare light it has not seen.
+constexpr double kPilotTrust = 0.9;
+// A shadow's edge narrower than this, in pixels, is as good as hard.
+constexpr double kHardEdge_px = 0.2;
+
+constexpr std::array<std::string_view, BouncedLight::kMostBounces + 1> kNumbers = {
+    "0", "1", "2", "3", "4", "5", "6", "7", "8", "9", "10", "11", "12", "13", "14", "15", "16"};
+
+/// By the pixel's place on the detector, so that a moving region does not move the noise. The first
+/// four words are the image's, the next the pilot's.
+Draws draws_of(const Snapshot& snapshot, int u, int v) noexcept {
+  const auto place = static_cast<std::uint32_t>((v & 0xFFFF) << 16 | (u & 0xFFFF));
+  return {snapshot.seed, Stream::kLight, snapshot.sequence, place};
+}
+
+/// Samples of each cell and replicate, from samples of a pixel.
+std::uint32_t each_of(int samples, int side, int replicates) noexcept {
+  const int parts = side * side * replicates;
+  return static_cast<std::uint32_t>((samples + parts - 1) / parts);
 }
 
 }  // namespace
@@ -29,15 +41,28 @@ PathTracer::PathTracer(const RenderSpec& spec, std::shared_ptr<TracedTarget> tar
                        WorkerPool& pool)
     : spec_(spec),
       target_(std::move(target)),
-      bounced_(*target_, spec.bounces),
+      bounced_(*target_, BounceRules{spec.bounces, spec.sampler, spec.exact_caustics}),
       footprint_(spec.camera, spec.grid.beyond_frame_px, target_->mesh.vertices.size()),
+      noise_(spec.camera.frame().grown_by(spec.grid.beyond_frame_px), spec.noise),
       pool_(pool) {
-  ENSURE(at(spec.grid.oversampling * spec.grid.oversampling) <= Cells::kMost);
+  const int side = spec.grid.oversampling;
+  ENSURE(side <= RowTracer::kMostSide);
   const PixelRect all = spec.camera.frame().grown_by(spec.grid.beyond_frame_px);
-  row_counts_.resize(static_cast<std::size_t>(all.height()));
+  const std::size_t pixels = at(all.width()) * at(all.height());
+  row_counts_.resize(at(all.height()));
+  wanted_.resize(pixels);
+  replicates_.resize(pixels);
+  mean_.resize(pixels);
+  variance_.resize(pixels);
+  const RowTracer::Rules rules{spec.sequence, spec.bounce_share};
+  const int slots = std::max(side * side * kReplicates, kPilotReplicates);
+  for (int i = 0; i < pool.threads(); ++i)
+    benches_.push_back(
+        std::make_unique<Bench>(*target_, bounced_, rules, all.width(), side * side, slots));
 }
 
 RenderReport PathTracer::render(const Snapshot& snapshot, Budget budget, Radiance& out) noexcept {
+  const Duration start = reads_clock(budget) ? spec_.clock() : Duration{};
   const int s = spec_.grid.oversampling;
   footprint_.project(target_->mesh, snapshot);
   out.region = footprint_.region();
@@ -48,130 +73,246 @@ RenderReport PathTracer::render(const Snapshot& snapshot, Budget budget, Radianc
   out.grid.resize(out.region.width() * s, out.region.height() * s);
   out.cover.resize(out.grid.width(), out.grid.height());
 
-  const int wanted =
-      budget.samples_per_pixel > 0 ? budget.samples_per_pixel : spec_.samples_per_pixel;
-  const int per_cell = (wanted + s * s - 1) / (s * s);
-  const Matrix3d& axes = snapshot.body_from_camera.matrix;
-  View view;
-  view.origin = snapshot.camera.m;
-  view.at_zero = axes * spec_.camera.direction_at({0.0, 0.0});
-  view.per_u = axes.col(0) * spec_.camera.ifov_rad();
-  view.per_v = axes.col(1) * spec_.camera.ifov_rad();
-  view.advance = std::max(0.0, snapshot.camera.m.norm() - 1.2 * target_->bounding_radius_m);
-
   RenderReport report;
-  report.samples_per_pixel = per_cell * s * s;
-  report.bounces = spec_.bounces;
+  report.bounces = bounced_.bounces();
   report.visible_fraction = footprint_.visible_fraction();
+  report.add({"bounces", kNumbers[at(report.bounces)], spec_.bounces_left_out_e});
   if (out.region.empty()) return report;
-  target_->facets.light_up(snapshot, pool_);
-  pool_.rows(0, out.region.height(),
-             [&](int row) { trace_pixel_row(snapshot, view, per_cell, out, row); });
-  for (int row = 0; row < out.region.height(); ++row) {
-    const RowCounts& counts = row_counts_[static_cast<std::size_t>(row)];
+  const double glint_radius_rad = spec_.sun_disc == SunDisc::kOff ? 0.0 : kSunAngularRadius_rad;
+  target_->facets.light_up(snapshot, pool_, glint_radius_rad);
+  const TracedFrame frame(snapshot, spec_.camera, target_->bounding_radius_m,
+                          sun_radius_for(snapshot, report));
+  std::fill(row_counts_.begin(), row_counts_.end(), RowCounts{});
+  choose_samples(frame, snapshot, budget, out.region);
+  run_passes(frame, snapshot, budget, start, out, report);
+  for (const RowCounts& counts : row_counts_) {
     report.samples += counts.samples;
     report.hits += counts.hits;
-    report.rays += counts.rays.rays;
-    report.rejected_rays += counts.rays.rejected;
+    report.rejected_rays += counts.rejected;
+    report.rays_by_kind.camera += counts.rays.camera;
+    report.rays_by_kind.shadow += counts.rays.shadow;
+    report.rays_by_kind.bounce += counts.rays.bounce;
+    report.rays_by_kind.bounce_shadow += counts.rays.bounce_shadow;
   }
+  const RaysByKind& kinds = report.rays_by_kind;
+  report.rays = kinds.camera + kinds.shadow + kinds.bounce + kinds.bounce_shadow;
   return report;
 }
 
-void PathTracer::trace_pixel_row(const Snapshot& snapshot, const View& view, int samples_per_cell,
-                                 Radiance& out, int row) noexcept {
-  const int s = out.oversampling;
-  RowCounts& counts = row_counts_[static_cast<std::size_t>(row)] = {};
-  const int v = out.region.top + row;
-  for (int column = 0; column < out.region.width(); ++column) {
-    const int u = out.region.left + column;
-    Cells cells;
-    if (footprint_.marked(u, v)) {
-      // By the pixel's place on the detector, so that a moving region does not move the noise.
-      const auto place = static_cast<std::uint32_t>((v & 0xFFFF) << 16 | (u & 0xFFFF));
-      const Draws draws(snapshot.seed, Stream::kLight, snapshot.sequence, place);
-      trace_pixel(snapshot, view, samples_per_cell,
-                  {static_cast<double>(u), static_cast<double>(v)}, draws, cells, counts);
+bool PathTracer::reads_clock(const Budget& budget) const noexcept {
+  return budget.passes == 0 && budget.time > Duration{} && spec_.clock != nullptr;
+}
+
+/// Of the disc that shadow rays are spread over: an edge is as wide as the disc at the distance of
+/// what throws it, and that is no further than the target is wide.
+double PathTracer::sun_radius_for(const Snapshot& snapshot, RenderReport& report) const noexcept {
+  const double widest_m = 2.0 * kSunAngularRadius_rad * 2.0 * target_->bounding_radius_m;
+  const double pixel_m = snapshot.camera.m.norm() * spec_.camera.ifov_rad();
+  const bool shows = widest_m > kHardEdge_px * pixel_m;
+  constexpr double kNotKnown = std::numeric_limits<double>::quiet_NaN();
+  if (spec_.sun_disc == SunDisc::kOff) {
+    report.add({"sun disc", "none", kNotKnown});
+    return 0.0;
+  }
+  const bool soft = spec_.sun_disc == SunDisc::kOn || shows;
+  report.add({"sun disc", soft ? "glints and shadows" : "glints", soft ? 0.0 : kNotKnown});
+  return soft ? kSunAngularRadius_rad : 0.0;
+}
+
+/// wanted_: by the budget, by the scenario, or by a pilot.
+void PathTracer::choose_samples(const TracedFrame& frame, const Snapshot& snapshot,
+                                const Budget& budget, const PixelRect& region) noexcept {
+  const int side = spec_.grid.oversampling;
+  const std::size_t pixels = at(region.width()) * at(region.height());
+  const int fixed = budget.samples_per_pixel > 0 ? budget.samples_per_pixel
+                    : budget.rho_mc > 0.0        ? 0
+                                                 : spec_.samples_per_pixel;
+  if (fixed > 0) {
+    replicates_used_ = fixed <= side * side ? 1 : kReplicates;
+    std::fill_n(wanted_.begin(), pixels, each_of(fixed, side, replicates_used_));
+    return;
+  }
+  replicates_used_ = kReplicates;
+  pool_.rows(0, region.height(), [&](int row) { pilot_row(frame, snapshot, region, row); });
+  const double limit = kPilotTrust * (budget.rho_mc > 0.0 ? budget.rho_mc : spec_.profile.rho_mc);
+  const int least = side * side * kReplicates;
+  noise_.plan({limit, least, kMostSamples}, region, mean_, variance_, wanted_);
+  for (std::size_t i = 0; i < pixels; ++i)
+    wanted_[i] = each_of(static_cast<int>(wanted_[i]), side, kReplicates);
+}
+
+/// mean_, and variance_ of one sample.
+void PathTracer::pilot_row(const TracedFrame& frame, const Snapshot& snapshot,
+                           const PixelRect& region, int row) noexcept {
+  Bench& bench = take_bench();
+  RowTracer& tracer = bench.tracer;
+  tracer.begin(frame, region.width(), 1, kPilotReplicates);
+  const int v = region.top + row;
+  for (int column = 0; column < region.width(); ++column) {
+    const int u = region.left + column;
+    if (!footprint_.marked(u, v)) continue;
+    Draws draws = draws_of(snapshot, u, v);
+    static_cast<void>(draws.block());  // the image's
+    const auto keys = draws.block();
+    tracer.trace(column, {1.0 * u, 1.0 * v}, keys, 0, kPilotEach);
+    row_counts_[at(row)].samples += kPilotReplicates * kPilotEach;
+  }
+  tracer.finish();
+  for (int column = 0; column < region.width(); ++column) {
+    double sum = 0;
+    double squares = 0;
+    for (int r = 0; r < kPilotReplicates; ++r) {
+      const double mean = tracer.light(column, 0, r) / kPilotEach;
+      sum += mean;
+      squares += mean * mean;
     }
-    for (int y = 0; y < s; ++y) {
-      for (int x = 0; x < s; ++x) {
-        out.grid.at(column * s + x, row * s + y) = cells.radiance[at(y * s + x)];
-        out.cover.at(column * s + x, row * s + y) = cells.cover[at(y * s + x)];
-      }
+    const std::size_t i = pixel(region, column, row);
+    const double variance =
+        std::max(0.0, squares - sum * sum / kPilotReplicates) / (kPilotReplicates - 1);
+    mean_[i] = static_cast<float>(sum / kPilotReplicates);
+    variance_[i] = static_cast<float>(variance * kPilotEach);
+  }
+  count(tracer, row);
+  bench.taken.store(false, std::memory_order_release);
+}
+
+void PathTracer::run_passes(const TracedFrame& frame, const Snapshot& snapshot,
+                            const Budget& budget, Duration start, Radiance& out,
+                            RenderReport& report) noexcept {
+  const std::size_t pixels = at(out.region.width()) * at(out.region.height());
+  const std::uint32_t most =
+      *std::max_element(wanted_.begin(), wanted_.begin() + static_cast<std::ptrdiff_t>(pixels));
+  const bool by_clock = reads_clock(budget);
+  const bool in_passes = budget.passes > 0 || by_clock;
+  Pass pass{0, in_passes ? std::min(1U, most) : most};
+  for (;;) {
+    const Duration before = by_clock ? spec_.clock() : Duration{};
+    pool_.rows(0, out.region.height(),
+               [&](int row) { trace_row(frame, snapshot, pass, out, row); });
+    ++report.passes;
+    if (pass.to == most || report.passes == budget.passes) break;
+    const Pass next{pass.to, std::min(most, 2 * pass.to)};
+    if (by_clock) {
+      const Duration now = spec_.clock();
+      const double each_s =
+          seconds(now - before) / static_cast<double>(samples_of(pass, out.region));
+      const double next_s = each_s * static_cast<double>(samples_of(next, out.region));
+      if (seconds(now - start) + next_s > seconds(budget.time)) break;
     }
+    pass = next;
+  }
+  report_noise(out.region, pass.to, report);
+}
+
+std::uint64_t PathTracer::samples_of(const Pass& pass, const PixelRect& region) const noexcept {
+  std::uint64_t samples = 1;
+  const std::size_t pixels = at(region.width()) * at(region.height());
+  for (std::size_t i = 0; i < pixels; ++i)
+    samples += std::min(wanted_[i], pass.to) - std::min(wanted_[i], pass.from);
+  return samples;
+}
+
+void PathTracer::trace_row(const TracedFrame& frame, const Snapshot& snapshot, const Pass& pass,
+                           Radiance& out, int row) noexcept {
+  Bench& bench = take_bench();
+  RowTracer& tracer = bench.tracer;
+  const PixelRect& region = out.region;
+  const int side = out.oversampling;
+  tracer.begin(frame, region.width(), side, replicates_used_);
+  const int v = region.top + row;
+  for (int column = 0; column < region.width(); ++column) {
+    const int u = region.left + column;
+    const std::uint32_t to = std::min(pass.to, wanted_[pixel(region, column, row)]);
+    if (!footprint_.marked(u, v) || to <= pass.from) continue;
+    const auto keys = draws_of(snapshot, u, v).block();
+    tracer.trace(column, {1.0 * u, 1.0 * v}, keys, static_cast<int>(pass.from),
+                 static_cast<int>(to));
+    row_counts_[at(row)].samples +=
+        static_cast<std::uint64_t>(side * side * replicates_used_) * (to - pass.from);
+  }
+  tracer.finish();
+  for (int column = 0; column < region.width(); ++column)
+    take_pixel(tracer, pass, out, column, row);
+  count(tracer, row);
+  bench.taken.store(false, std::memory_order_release);
+}
+
+/// The means so far, with what the pass has added.
+void PathTracer::take_pixel(const RowTracer& tracer, const Pass& pass, Radiance& out, int column,
+                            int row) noexcept {
+  const int side = out.oversampling;
+  const std::size_t i = pixel(out.region, column, row);
+  const std::uint32_t to = std::min(pass.to, wanted_[i]);
+  if (pass.from > 0 && to <= pass.from) return;
+  const double old_share = static_cast<double>(pass.from) / to;
+  std::array<double, kReplicates> sums{};
+  for (int cell = 0; cell < side * side; ++cell) {
+    double light = 0;
+    for (int r = 0; r < replicates_used_; ++r) {
+      const double part = tracer.light(column, cell, r);
+      sums[at(r)] += part;
+      light += part;
+    }
+    const double samples = 1.0 * replicates_used_ * to;
+    float& grid = out.grid.at(column * side + cell % side, row * side + cell / side);
+    float& cover = out.cover.at(column * side + cell % side, row * side + cell / side);
+    const bool first = pass.from == 0;
+    grid =
+        static_cast<float>((first ? 0.0 : old_share * static_cast<double>(grid)) + light / samples);
+    cover = static_cast<float>((first ? 0.0 : old_share * static_cast<double>(cover)) +
+                               tracer.covered(column, cell) / samples);
+  }
+  for (int r = 0; r < replicates_used_; ++r) {
+    float& mean = replicates_[i][at(r)];
+    mean = static_cast<float>((pass.from == 0 ? 0.0 : old_share * static_cast<double>(mean)) +
+                              sums[at(r)] / (1.0 * side * side * to));
   }
 }
 
-void PathTracer::trace_pixel(const Snapshot& snapshot, const View& view, int samples_per_cell,
-                             PixelPoint pixel, Draws draws, Cells& cells,
-                             RowCounts& counts) const noexcept {
-  const int s = spec_.grid.oversampling;
-  const int total = samples_per_cell * s * s;
-  const float shift_u = draws.uniform();
-  const float shift_v = draws.uniform();
-  std::array<std::size_t, kLanes> cell_of{};
-  for (int first = 0; first < total; first += RayPacket::kLanes) {
-    RayPacket rays;
-    const int lanes = std::min(RayPacket::kLanes, total - first);
-    for (int lane = 0; lane < lanes; ++lane) {
-      const int cell = (first + lane) / samples_per_cell;
-      const PixelPoint in_cell = spread_point(first + lane, shift_u, shift_v);
-      const int cell_column = cell % s;
-      const int cell_row = cell / s;
-      const double u = pixel.u - 0.5 + (cell_column + in_cell.u) / s;
-      const double v = pixel.v - 0.5 + (cell_row + in_cell.v) / s;
-      const Vector3d direction = view.at_zero + u * view.per_u + v * view.per_v;
-      rays.set(lane, (view.origin + view.advance * direction).cast<float>(),
-               direction.cast<float>());
-      cell_of[at(lane)] = at(cell);
-    }
-    const Seen seen = shade(snapshot, rays, draws, counts);
-    for (std::size_t lane = 0; lane < at(lanes); ++lane) {
-      cells.radiance[cell_of[lane]] += seen.radiance[lane];
-      cells.cover[cell_of[lane]] += seen.target[lane] ? 1.0F : 0.0F;
+/// `reached`: the largest number of samples of a cell and replicate.
+void PathTracer::report_noise(const PixelRect& region, std::uint32_t reached,
+                              RenderReport& report) noexcept {
+  static_assert(kReplicates == 2);
+  const int side = spec_.grid.oversampling;
+  double samples = 0;
+  std::uint64_t lit = 0;
+  for (int row = 0; row < region.height(); ++row) {
+    for (int column = 0; column < region.width(); ++column) {
+      const std::size_t i = pixel(region, column, row);
+      if (replicates_used_ == 1) replicates_[i][1] = replicates_[i][0];
+      const auto& [a, b] = replicates_[i];
+      mean_[i] = 0.5F * (a + b);
+      // Of the mean of two: half of the variance of one, which is half their squared difference.
+      variance_[i] = 0.25F * (a - b) * (a - b);
+      if (!(mean_[i] > 0.0F)) continue;
+      ++lit;
+      samples += std::min(wanted_[i], reached);
     }
   }
-  counts.samples += static_cast<std::uint64_t>(total);
-  const auto samples = static_cast<float>(samples_per_cell);
-  for (float& cell : cells.radiance) cell /= samples;
-  for (float& cell : cells.cover) cell /= samples;
+  const int parts = side * side * replicates_used_;
+  report.samples_per_pixel =
+      lit > 0 ? static_cast<int>(std::lround(samples / static_cast<double>(lit) * parts))
+              : static_cast<int>(std::min(reached, wanted_[0])) * parts;
+  report.rho_mc = noise_.measure(region, mean_, variance_);
+  if (replicates_used_ == 1)
+    report.rho_mc.rms = report.rho_mc.worst = std::numeric_limits<double>::quiet_NaN();
 }
 
-PathTracer::Seen PathTracer::shade(const Snapshot& snapshot, const RayPacket& rays, Draws& draws,
-                                   RowCounts& counts) const noexcept {
-  std::array<MeshHit, kLanes> hits;
-  target_->scene.intersect(rays, hits, counts.rays);
-  Seen seen;
-  RayPacket shadow;
-  const auto lamps = lamps_of(snapshot);
-  bool any_lit = false;
-  for (std::size_t i = 0; i < kLanes; ++i) {
-    if (hits[i].triangle == MeshHit::kNone) continue;
-    ++counts.hits;
-    seen.target[i] = true;
-    const Vector3f direction(rays.direction_x[i], rays.direction_y[i], rays.direction_z[i]);
-    const SurfacePoint point = target_->facets.at(hits[i], direction);
-    const auto& light = target_->facets.radiance(hits[i].triangle);
-    const float both = light[0] + light[1];
-    if (both > 0.0F) {
-      const std::size_t lamp = draws.uniform() * both < light[0] ? 0 : 1;
-      shadow.set(static_cast<int>(i), point.start(), lamps[lamp]->toward.unit.cast<float>());
-      seen.radiance[i] = both;
-      any_lit = true;
-    }
-  }
-  std::array<bool, kLanes> blocked{};
-  if (any_lit) target_->scene.occluded(shadow, blocked, counts.rays);
-  for (std::size_t i = 0; i < kLanes; ++i) {
-    if (blocked[i]) seen.radiance[i] = 0.0F;
-    if (hits[i].triangle == MeshHit::kNone || spec_.bounces == 0) continue;
-    if (static_cast<double>(draws.uniform()) >= spec_.bounce_share) continue;
-    const Vector3f direction(rays.direction_x[i], rays.direction_y[i], rays.direction_z[i]);
-    const double bounced =
-        bounced_.radiance(snapshot, target_->facets.at(hits[i], direction),
-                          direction.cast<double>().normalized(), draws, counts.rays);
-    seen.radiance[i] += static_cast<float>(bounced / spec_.bounce_share);
-  }
-  return seen;
+void PathTracer::count(const RowTracer& tracer, int row) noexcept {
+  RowCounts& counts = row_counts_[at(row)];
+  counts.rays.camera += tracer.camera_rays().rays;
+  counts.rays.shadow += tracer.shadow_rays().rays;
+  counts.rays.bounce += tracer.bounce_rays().rays;
+  counts.rays.bounce_shadow += tracer.bounce_shadow_rays().rays;
+  counts.rejected += tracer.camera_rays().rejected + tracer.shadow_rays().rejected +
+                     tracer.bounce_rays().rejected + tracer.bounce_shadow_rays().rejected;
+  counts.hits += tracer.hits();
+}
+
+/// There is one for each thread of the pool.
+PathTracer::Bench& PathTracer::take_bench() noexcept {
+  for (std::size_t i = 0;; i = (i + 1) % benches_.size())
+    if (!benches_[i]->taken.exchange(true, std::memory_order_acquire)) return *benches_[i];
 }
 
 }  // namespace engine

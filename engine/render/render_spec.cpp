@@ -2,10 +2,21 @@
 
 #include <utility>
 
+#include "engine/render/bounce_depth.h"
+#include "engine/render/bounced_light.h"
 #include "engine/render/lattice_renderer.h"
 #include "engine/render/path_tracer.h"
 
 namespace engine {
+
+namespace {
+
+bool is_auto(const ConfigTable& table, const std::string& key) {
+  if (!table.is_text(key)) return false;
+  return table.choice_or<bool>(key, "auto", {{"auto", true}});
+}
+
+}  // namespace
 
 RenderSpec read_render(const ConfigTable& table) {
   RenderSpec spec;
@@ -13,18 +24,40 @@ RenderSpec read_render(const ConfigTable& table) {
       "method", "paths", {{"lattice", RenderMethod::kLattice}, {"paths", RenderMethod::kPaths}});
   spec.lattice_side = table.choice_or<int>("lattice", "8x8", {{"8x8", 8}, {"4x4", 4}, {"2x2", 2}});
   spec.bounce_paths = static_cast<int>(table.integer_or("bounce_paths", 64, between(0, 4096)));
+  spec.profile = table.choice_or<RenderProfile>(
+      "profile", "default",
+      {{"default", {0.3, 0.19}}, {"reference", {0.1, 0.063}}, {"preview", {1.0, 0.63}}});
+  const bool as_noise_asks = is_auto(table, "samples_per_pixel");
   spec.samples_per_pixel =
-      static_cast<int>(table.integer_or("samples_per_pixel", 50, between(1, 100000)));
-  spec.bounces = static_cast<int>(table.integer_or("bounces", 1, between(0, 16)));
+      as_noise_asks
+          ? 0
+          : static_cast<int>(table.integer_or("samples_per_pixel", 50, between(1, 100000)));
+  spec.bounces_by_need = is_auto(table, "bounces");
+  if (!spec.bounces_by_need)
+    spec.bounces =
+        static_cast<int>(table.integer_or("bounces", 1, between(0, BouncedLight::kMostBounces)));
+  spec.sampler = table.choice_or<BrdfSampler>("sampler", "mis",
+                                              {{"mis", BrdfSampler::kMixture},
+                                               {"cosine", BrdfSampler::kCosine},
+                                               {"uniform", BrdfSampler::kUniform},
+                                               {"paper-cone", BrdfSampler::kPaperCone}});
+  spec.sequence = table.choice_or<SequenceKind>(
+      "sequence", "sobol",
+      {{"sobol", SequenceKind::kSobol}, {"independent", SequenceKind::kIndependent}});
+  spec.exact_caustics =
+      table.choice_or<bool>("caustics", "spread", {{"spread", false}, {"exact", true}});
+  spec.sun_disc = table.choice_or<SunDisc>(
+      "sun_disc", "auto", {{"auto", SunDisc::kAuto}, {"on", SunDisc::kOn}, {"off", SunDisc::kOff}});
   spec.bounce_share = table.number_or("bounce_share", 0.15, between(0.001, 1.0));
   return spec;
 }
 
 std::unique_ptr<Renderer> make_renderer(const RenderSpec& spec,
                                         std::shared_ptr<TracedTarget> target, WorkerPool& pool) {
-  if (spec.method == RenderMethod::kPaths)
-    return std::make_unique<PathTracer>(spec, std::move(target), pool);
-  return std::make_unique<LatticeRenderer>(spec, std::move(target), pool);
+  const RenderSpec settled = with_bounces_settled(spec, *target);
+  if (settled.method == RenderMethod::kPaths)
+    return std::make_unique<PathTracer>(settled, std::move(target), pool);
+  return std::make_unique<LatticeRenderer>(settled, std::move(target), pool);
 }
 
 }  // namespace engine

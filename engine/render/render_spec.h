@@ -1,10 +1,13 @@
 #pragma once
 
+#include <limits>
 #include <memory>
 
 #include "engine/core/config_reader.h"
 #include "engine/core/worker_pool.h"
 #include "engine/render/renderer.h"
+#include "engine/render/sobol.h"
+#include "engine/scene/brdf.h"
 #include "engine/scene/camera_geometry.h"
 
 namespace engine {
@@ -16,16 +19,39 @@ enum class RenderMethod : std::uint8_t {
   kPaths     ///< PathTracer: the reference
 };
 
+/// Whether the Sun is its disc or a point.
+enum class SunDisc : std::uint8_t {
+  kAuto,  ///< glints always, shadows where their edges are wide enough to show
+  kOn,
+  kOff
+};
+
+/// What errors a frame may have, as shares of the sensor's noise.
+struct RenderProfile {
+  double rho_total = 0.3;  ///< of all model errors together
+  double rho_mc = 0.19;    ///< of Monte Carlo noise after the optics, rms over lit pixels
+};
+
 struct RenderSpec {
   RenderMethod method = RenderMethod::kPaths;
   int lattice_side = 8;        ///< lattice: points on a side of a cell: 2, 4 or 8
   int bounce_paths = 64;       ///< lattice: paths a pixel that follow bounces in corners
-  int samples_per_pixel = 50;  ///< paths: shared by the cells of a pixel, rounded up
-  double bounce_share = 0.15;  ///< paths: in (0, 1]: of the samples that follow the first bounce
-  int bounces = 1;             ///< indirect bounces; 0 leaves direct light alone
+  RenderProfile profile;
+  int samples_per_pixel = 50;    ///< paths: shared by the cells of a pixel, rounded up; 0: as the
+                                 ///< profile asks
+  double bounce_share = 0.15;    ///< paths: in (0, 1]: of the samples that follow the first bounce
+  int bounces = 1;               ///< indirect bounces; 0 leaves direct light alone
+  bool bounces_by_need = false;  ///< `bounces` is chosen when the renderer is made
+  /// What further bounces would add to a pixel, at most; not a number: not known.
+  double bounces_left_out_e = std::numeric_limits<double>::quiet_NaN();
+  BrdfSampler sampler = BrdfSampler::kMixture;   ///< paths: of bounces
+  SequenceKind sequence = SequenceKind::kSobol;  ///< paths
+  bool exact_caustics = false;                   ///< paths
+  SunDisc sun_disc = SunDisc::kAuto;
   CameraGeometry camera;
   GridWish grid;
   SensorNoise noise;
+  Duration (*clock)() noexcept = nullptr;  ///< for Budget::time; none: no deadline
 };
 [[nodiscard]] RenderSpec read_render(const ConfigTable& table);
 

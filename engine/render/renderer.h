@@ -55,7 +55,9 @@ struct SensorNoise {
 /// What a frame may cost. 0 leaves it to the renderer's own setting.
 struct Budget {
   int samples_per_pixel = 0;  ///< so many in every pixel, whatever the noise
-  double rho_mc = 0;          ///< the largest Monte Carlo error after the optics, in sigmas
+  double rho_mc = 0;          ///< the largest Monte Carlo error after the optics, in sigmas, rms
+  Duration time{};            ///< passes go on while the next one is likely to fit
+  int passes = 0;             ///< so many, whatever the time: what a replay obeys
 };
 
 /// A step of a ladder that a frame took. Both names are of static storage.
@@ -74,13 +76,22 @@ struct NoiseReached {
   int clipped_px = 0;
 };
 
+struct RaysByKind {
+  std::uint64_t camera = 0;
+  std::uint64_t shadow = 0;
+  std::uint64_t bounce = 0;
+  std::uint64_t bounce_shadow = 0;
+};
+
 /// What was reached.
 struct RenderReport {
   std::uint64_t samples = 0;  ///< through the cells where the target can be
   std::uint64_t hits = 0;     ///< of these, on the target
   std::uint64_t rays = 0;
+  RaysByKind rays_by_kind;          ///< where the renderer tells them apart
   std::uint64_t rejected_rays = 0;  ///< not finite or out of range: never given to the tracer
-  int samples_per_pixel = 0;
+  int samples_per_pixel = 0;        ///< mean over those that see light
+  int passes = 0;                   ///< over the image, each with further samples
   int bounces = 0;
   /// Of the target's image, lit or not, the share that lies in the frame: 1 wholly inside, 0
   /// outside. By area, each layer of surface for itself; the same as of the outline for a convex
@@ -89,6 +100,15 @@ struct RenderReport {
   NoiseReached rho_mc;
   static constexpr std::size_t kMostRungs = 8;
   std::array<Rung, kMostRungs> rungs{};  ///< those with a name
+
+  /// One too many is lost.
+  void add(const Rung& rung) noexcept {
+    for (Rung& r : rungs) {
+      if (!r.ladder.empty()) continue;
+      r = rung;
+      return;
+    }
+  }
 };
 
 /// Thread: loop; it owns its workers. Loop-safe: the scene is built in the constructor.

@@ -19,6 +19,11 @@ double one_minus_cos(const Vector3d& a, const Vector3d& b) noexcept {
   return 0.5 * (a - b).squaredNorm();
 }
 
+// theta_1 = 15 deg of eq 13, as 1 - cos.
+constexpr double kPaperCone = 0.034074173710931713;
+
+Vector3d mirrored(const Vector3d& v) noexcept { return {-v.x(), -v.y(), v.z()}; }
+
 }  // namespace
 
 Brdf::Brdf(const FiveParameters& parameters, Variant variant, double wrinkle_rad)
@@ -180,8 +185,12 @@ double Brdf::lobe_share(const Vector3d& out) const noexcept {
   return std::clamp(specular / (specular + kPi * p_.kd + 1e-12), 0.1, 0.9);
 }
 
-double Brdf::pdf(const Vector3d& in, const Vector3d& out) const noexcept {
+double Brdf::pdf(const Vector3d& in, const Vector3d& out, BrdfSampler how) const noexcept {
   if (in.z() <= kGrazing || out.z() <= kGrazing) return 0.0;
+  if (how == BrdfSampler::kCosine) return in.z() / kPi;
+  if (how == BrdfSampler::kUniform) return 0.5 / kPi;
+  if (how == BrdfSampler::kPaperCone)
+    return one_minus_cos(in, mirrored(out)) <= kPaperCone ? 0.5 / (kPi * kPaperCone) : 0.0;
   const double share = lobe_share(out);
   double density = (1.0 - share) * in.z() / kPi;
   if (share > 0.0) {
@@ -196,27 +205,42 @@ double Brdf::pdf(const Vector3d& in, const Vector3d& out) const noexcept {
   return density;
 }
 
-Brdf::Sample Brdf::sample(const Vector3d& out, Draws& draws) const noexcept {
-  const double share = lobe_share(out);
-  const double azimuth = 2.0 * kPi * static_cast<double>(draws.uniform());
-  const double u = static_cast<double>(draws.uniform());
+/// By a half vector with the lobe's distribution.
+Vector3d Brdf::from_lobe(const Vector3d& out, double u, double azimuth) const noexcept {
+  const double cell = u * kLobeCells;
+  const auto low =
+      std::min(static_cast<std::size_t>(cell), static_cast<std::size_t>(kLobeCells - 1));
+  const double x =
+      lobe_edges_[low] + (cell - static_cast<double>(low)) *
+                             (static_cast<double>(lobe_edges_[low + 1]) - lobe_edges_[low]);
+  const double sin_h = std::sqrt(x * (2.0 - x));
+  const Vector3d h(sin_h * std::cos(azimuth), sin_h * std::sin(azimuth), 1.0 - x);
+  return 2.0 * out.dot(h) * h - out;
+}
+
+Brdf::Sample Brdf::sample(const Vector3d& out, BrdfSampler how,
+                          const std::array<float, 2>& direction, float choice) const noexcept {
+  const auto u = static_cast<double>(direction[0]);
+  const double azimuth = 2.0 * kPi * static_cast<double>(direction[1]);
+  const auto round_z = [&](double z) {
+    const double radius = std::sqrt((1.0 - z) * (1.0 + z));
+    return Vector3d(radius * std::cos(azimuth), radius * std::sin(azimuth), z);
+  };
   Sample s;
-  if (static_cast<double>(draws.uniform()) < share) {
-    const double cell = u * kLobeCells;
-    const auto low =
-        std::min(static_cast<std::size_t>(cell), static_cast<std::size_t>(kLobeCells - 1));
-    const double x =
-        lobe_edges_[low] + (cell - static_cast<double>(low)) *
-                               (static_cast<double>(lobe_edges_[low + 1]) - lobe_edges_[low]);
-    const double sin_h = std::sqrt(x * (2.0 - x));
-    const Vector3d h(sin_h * std::cos(azimuth), sin_h * std::sin(azimuth), 1.0 - x);
-    s.in = 2.0 * out.dot(h) * h - out;
+  if (how == BrdfSampler::kUniform) {
+    s.in = round_z(u);
+  } else if (how == BrdfSampler::kPaperCone) {
+    const Vector3d mirror = mirrored(out);
+    const Vector3d x = mirror.unitOrthogonal();
+    const Vector3d in_cone = round_z(1.0 - u * kPaperCone);
+    s.in = in_cone.x() * x + in_cone.y() * mirror.cross(x) + in_cone.z() * mirror;
+  } else if (how == BrdfSampler::kMixture && static_cast<double>(choice) < lobe_share(out)) {
+    s.in = from_lobe(out, u, azimuth);
   } else {
-    const double radius = std::sqrt(u);
-    s.in = {radius * std::cos(azimuth), radius * std::sin(azimuth), std::sqrt(1.0 - u)};
+    s.in = round_z(std::sqrt(1.0 - u));
   }
-  const double density = pdf(s.in, out);
-  if (density > 0.0) s.weight = eval(s.in, out) * s.in.z() / density;
+  s.density = pdf(s.in, out, how);
+  if (s.density > 0.0) s.weight = eval(s.in, out) * s.in.z() / s.density;
   return s;
 }
 

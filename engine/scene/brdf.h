@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "engine/core/config_reader.h"
-#include "engine/core/random.h"
 #include "engine/core/vec.h"
 
 namespace engine {
@@ -17,6 +16,14 @@ struct FiveParameters {
   double kb = 15.42;
   double kd = 0.047;
   double kr = 0.717;
+};
+
+/// How directions of bounces are drawn.
+enum class BrdfSampler : std::uint8_t {
+  kMixture,   ///< cosine and lobe, weighed against each other: finds all light, with least noise
+  kCosine,    ///< even in projected solid angle
+  kUniform,   ///< even over the hemisphere
+  kPaperCone  ///< eq 13-14 of the paper: 15 deg round the mirror direction, and nothing else
 };
 
 /// How a surface scatters light. All vectors are unit, in a frame whose z is the normal.
@@ -57,12 +64,16 @@ class Brdf {
 
   struct Sample {
     Eigen::Vector3d in = Eigen::Vector3d::UnitZ();
-    double weight = 0;  ///< eval * cos_in / pdf; 0 ends the path
+    double weight = 0;   ///< eval * cos_in / density; 0 ends the path
+    double density = 0;  ///< per steradian of `in`
   };
-  /// A direction from which light may come that leaves along `out`: mixture of cosine and lobe.
-  [[nodiscard]] Sample sample(const Eigen::Vector3d& out, Draws& draws) const noexcept;
+  /// A direction from which light may come that leaves along `out`. The numbers are even in (0, 1):
+  /// two of the direction, and `choice` between the parts of the mixture.
+  [[nodiscard]] Sample sample(const Eigen::Vector3d& out, BrdfSampler how,
+                              const std::array<float, 2>& direction, float choice) const noexcept;
   /// Of `sample`, per steradian of `in`.
-  [[nodiscard]] double pdf(const Eigen::Vector3d& in, const Eigen::Vector3d& out) const noexcept;
+  [[nodiscard]] double pdf(const Eigen::Vector3d& in, const Eigen::Vector3d& out,
+                           BrdfSampler how = BrdfSampler::kMixture) const noexcept;
 
  private:
   static constexpr int kAngles = 128;
@@ -76,6 +87,8 @@ class Brdf {
   [[nodiscard]] double specular_limit(double cos_in) const noexcept;
   [[nodiscard]] double specular_albedo(double cos_in) const noexcept;
   [[nodiscard]] double lobe_share(const Eigen::Vector3d& out) const noexcept;
+  [[nodiscard]] Eigen::Vector3d from_lobe(const Eigen::Vector3d& out, double u,
+                                          double azimuth) const noexcept;
   void blur_lobe(double wrinkle_rad);
   void tabulate_lobe();
   void tabulate_albedo();

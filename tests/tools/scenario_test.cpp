@@ -180,6 +180,14 @@ const std::vector<BadValue> kBadValues = {
     {"earth.earthshine=bright", "earth.earthshine", "got \"bright\""},
     {"sky.radiance_w_m2_sr=-1e-9", "sky.radiance_w_m2_sr", "must be >= 0"},
     {"render.samples_per_pixel=0", "render.samples_per_pixel", "got 0"},
+    {"render.samples_per_pixel=many", "render.samples_per_pixel", "\"auto\", got \"many\""},
+    {"render.bounces=17", "render.bounces", "got 17"},
+    {"render.bounces=all", "render.bounces", "\"auto\", got \"all\""},
+    {"render.profile=best", "render.profile", "got \"best\""},
+    {"render.sampler=cone", "render.sampler", "got \"cone\""},
+    {"render.sequence=halton", "render.sequence", "got \"halton\""},
+    {"render.caustics=none", "render.caustics", "got \"none\""},
+    {"render.sun_disc=half", "render.sun_disc", "got \"half\""},
     {"brdf.variant=shiny", "brdf.variant", "got \"shiny\""},
     {"actuator.damping=0", "actuator.damping", "got 0"},
     {"actuator.rate_limit_mrad_s=0", "actuator.rate_limit_mrad_s", "must be > 0, got 0"},
@@ -187,6 +195,24 @@ const std::vector<BadValue> kBadValues = {
     {"visibility.max_range_km=0", "visibility.max_range_km", "got 0"},
     {"visibility.span_days=1e9", "visibility.span_days", "got 1000000000"},
 };
+
+TEST(Scenario, RenderReadsWhatItIsToldAndWhatItIsToFindOut) {
+  const auto scenario =
+      load({"render.samples_per_pixel=auto", "render.bounces=auto", "render.profile=reference",
+            "render.sampler=paper-cone", "render.sequence=independent", "render.caustics=exact",
+            "render.sun_disc=off"});
+  EXPECT_EQ(scenario.render.samples_per_pixel, 0);
+  EXPECT_TRUE(scenario.render.bounces_by_need);
+  EXPECT_EQ(scenario.render.profile.rho_mc, 0.063);
+  EXPECT_EQ(scenario.render.sampler, engine::BrdfSampler::kPaperCone);
+  EXPECT_EQ(scenario.render.sequence, engine::SequenceKind::kIndependent);
+  EXPECT_TRUE(scenario.render.exact_caustics);
+  EXPECT_EQ(scenario.render.sun_disc, engine::SunDisc::kOff);
+  const auto plain = load({});
+  EXPECT_EQ(plain.render.samples_per_pixel, 50);
+  EXPECT_FALSE(plain.render.bounces_by_need);
+  EXPECT_EQ(plain.render.profile.rho_mc, 0.19);
+}
 
 TEST(Scenario, ABadOverrideIsAConfigErrorThatQuotesItAndNamesTheKey) {
   for (const BadValue& bad : kBadValues) {

@@ -207,6 +207,7 @@ Rig::Rig(const Scenario& scenario, int threads)
   const double noise_e = detector.noise_e(dark_e);
   render.noise = {optics.throughput_sr() * detector.electrons_per_irradiance(scenario.run.exposure),
                   noise_e * noise_e, detector.full_well_e, optics.noise_blur_px()};
+  render.clock = &hil::SteadyClock::stopwatch;
   engine::Mesh mesh = load_mesh(scenario);
   triangles_ = mesh.triangles.size();
   std::shared_ptr<engine::TracedTarget> target;
