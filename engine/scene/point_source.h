@@ -12,7 +12,7 @@ struct PointSource {
   double irradiance_w_m2 = 0;
   /// Its own motion from shutter open to shutter close, of stars: light in the target's window
   /// smears by Radiance::motion_px instead.
-  PixelPoint motion_px;
+  PixelPoint motion_px{};
 };
 
 }  // namespace engine

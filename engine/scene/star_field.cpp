@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "engine/core/constants.h"
@@ -43,6 +44,7 @@ struct StarField::Frame {
   double earth_sine;           ///< of half the Earth's angle
   bool at_rest;
   bool full = false;
+  double least_drawn_w_m2 = std::numeric_limits<double>::infinity();
 };
 
 StarField::StarField(const StarCatalogue& catalogue, const CameraGeometry& camera,
@@ -88,12 +90,15 @@ StarsFound StarField::find(const SkyView& sky, const StarLimits& limits,
     out.resize(before);
     found = {};
     frame.full = false;
+    frame.least_drawn_w_m2 = std::numeric_limits<double>::infinity();
     zones_.near(boresight, radius, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = first_[begin]; i < first_[end]; ++i)
         look_at(stars_[i], frame, found, out);
     });
     if (!frame.full) break;
-    frame.faint_w_m2 = std::max(frame.faint_w_m2, 1e-30) * kLimitRises;
+    for (std::size_t i = before; i < out.size(); ++i)
+      frame.least_drawn_w_m2 = std::min(frame.least_drawn_w_m2, out[i].irradiance_w_m2);
+    frame.faint_w_m2 = kLimitRises * std::max(frame.faint_w_m2, frame.least_drawn_w_m2);
   }
   return found;
 }
