@@ -35,13 +35,14 @@ void add_run(const PixelRect& run, FrameTruth& truth, TruthMask& mask) noexcept 
 ImagingChain::ImagingChain(const SnapshotBuilder& scene, std::unique_ptr<Renderer> renderer,
                            Optics optics, const Detector& detector,
                            const DetectorSpec& detector_spec, const CameraGeometry& camera,
-                           Stopwatch stopwatch)
+                           Stopwatch stopwatch, std::unique_ptr<Starlight> stars)
     : scene_(scene),
       renderer_(std::move(renderer)),
       optics_(std::move(optics)),
       detector_(detector),
       detector_spec_(detector_spec),
       stopwatch_(stopwatch),
+      stars_(std::move(stars)),
       irradiance_(camera.width_px, camera.height_px),
       electrons_(camera.width_px, camera.height_px) {
   const GridWish wish = optics_.wish();
@@ -59,6 +60,11 @@ FrameReport ImagingChain::expose(const Shot& shot, Budget budget, DnImage& out,
   report.render = renderer_->render(snapshot, budget, radiance_);
   const Duration rendered = now();
   report.optics = optics_.project(radiance_, irradiance_);
+  measure_light(report.optics.window, shot.exposure, report.truth, mask);
+  // What was measured is the target's light: the stars come after.
+  if (stars_ != nullptr)
+    report.stars = stars_->add(snapshot, radiance_,
+                               radiance_.uniform_w_m2_sr * optics_.throughput_sr(), irradiance_);
   const Duration projected = now();
   detector_.expose(irradiance_, shot.exposure, snapshot.seed, shot.sequence, electrons_);
   detector_.digitize(electrons_, snapshot.seed, shot.sequence, out);
@@ -76,7 +82,6 @@ FrameReport ImagingChain::expose(const Shot& shot, Budget budget, DnImage& out,
   truth.earthshine_w_m2 = snapshot.earthshine.irradiance_w_m2;
   truth.earth_behind = snapshot.earth_behind;
   truth.roll_is_fallback = snapshot.roll_is_fallback;
-  measure_light(report.optics.window, shot.exposure, truth, mask);
   const auto pixels = out.pixels();
   report.peak_dn = *std::max_element(pixels.begin(), pixels.end());
   return report;

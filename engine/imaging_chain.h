@@ -17,7 +17,8 @@ class ImagingChain final : public SceneGenerator {
 
   ImagingChain(const SnapshotBuilder& scene, std::unique_ptr<Renderer> renderer, Optics optics,
                const Detector& detector, const DetectorSpec& detector_spec,
-               const CameraGeometry& camera, Stopwatch stopwatch = nullptr);
+               const CameraGeometry& camera, Stopwatch stopwatch = nullptr,
+               std::unique_ptr<Starlight> stars = nullptr);
 
   FrameReport expose(const Shot& shot, Budget budget, DnImage& out,
                      TruthMask& mask) noexcept override;
@@ -37,6 +38,7 @@ class ImagingChain final : public SceneGenerator {
   Detector detector_;
   DetectorSpec detector_spec_;
   Stopwatch stopwatch_;
+  std::unique_ptr<Starlight> stars_;  ///< none: a sky without stars
   Radiance radiance_;
   IrradianceImage irradiance_;
   ElectronImage electrons_;

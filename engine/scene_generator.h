@@ -9,6 +9,7 @@
 #include "engine/optics/optics.h"
 #include "engine/render/renderer.h"
 #include "engine/scene/snapshot.h"
+#include "engine/starlight.h"
 
 namespace engine {
 
@@ -86,6 +87,7 @@ struct FrameReport {
   FrameTruth truth;
   RenderReport render;
   OpticsReport optics;
+  StarReport stars;
   StageTimes times;
   int peak_dn = 0;
 };

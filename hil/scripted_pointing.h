@@ -1,5 +1,7 @@
 #pragma once
 
+#include <optional>
+
 #include "engine/orbit/propagator.h"
 #include "engine/orbit/sight_line.h"
 #include "hil/pointing_source.h"
@@ -12,15 +14,18 @@ enum class RollRule : std::uint8_t {
   kVertical,   ///< the local vertical: x grows towards the Earth
 };
 
-/// Follows the predicted apparent line of sight to the target, and obeys nobody.
+/// Follows the predicted apparent line of sight to the target, or holds a fixed attitude, and obeys
+/// nobody.
 class ScriptedPointing final : public PointingSource {
  public:
   /// The propagators outlive it.
   ScriptedPointing(const engine::Propagator& camera, const engine::Propagator& target,
-                   engine::Epoch epoch, engine::LightPath path, RollRule roll)
-      : camera_(camera), target_(target), epoch_(epoch), path_(path), roll_(roll) {}
+                   engine::Epoch epoch, engine::LightPath path, RollRule roll,
+                   const std::optional<engine::CameraAttitude>& fixed = {})
+      : camera_(camera), target_(target), epoch_(epoch), path_(path), roll_(roll), fixed_(fixed) {}
 
   [[nodiscard]] engine::CameraAttitude attitude(engine::SimTime t) noexcept override {
+    if (fixed_) return *fixed_;
     const engine::Epoch now = epoch_ + t.time_since_epoch();
     const engine::SightLine line = engine::sight_line(camera_, target_, now, path_);
     if (roll_ == RollRule::kCelestial) return engine::look_along(line.apparent);
@@ -40,6 +45,7 @@ class ScriptedPointing final : public PointingSource {
   engine::Epoch epoch_;
   engine::LightPath path_;
   RollRule roll_;
+  std::optional<engine::CameraAttitude> fixed_;
 };
 
 }  // namespace hil

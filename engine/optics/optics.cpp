@@ -56,12 +56,18 @@ OpticsSpec read_optics(const ConfigTable& table, const CameraGeometry& camera) {
   return spec;
 }
 
-Optics::Optics(const OpticsSpec& spec, double faint_w_m2, WorkerPool& pool)
-    : spec_(spec), diffraction_(spec.band), faint_w_m2_(faint_w_m2), pool_(pool) {
+double throughput_sr(const OpticsSpec& spec) noexcept {
   const double d_over_f = spec.band.aperture_m / spec.band.focal_length_m;
   const double open = 1.0 - spec.band.obscuration * spec.band.obscuration;
-  throughput_sr_ = kPi / 4.0 * d_over_f * d_over_f * spec.transmission * open;
+  return kPi / 4.0 * d_over_f * d_over_f * spec.transmission * open;
+}
 
+Optics::Optics(const OpticsSpec& spec, double faint_w_m2, WorkerPool& pool)
+    : spec_(spec),
+      diffraction_(spec.band),
+      throughput_sr_(engine::throughput_sr(spec)),
+      faint_w_m2_(faint_w_m2),
+      pool_(pool) {
   const int side = std::max(spec.camera.width_px, spec.camera.height_px) + 4 * spec.largest_wing_px;
   std::vector<int> lengths = fast_lengths(side);
   const int longest = lengths.back() * kOversampling;

@@ -20,6 +20,9 @@ struct OpticsSpec {
 };
 [[nodiscard]] OpticsSpec read_optics(const ConfigTable& table, const CameraGeometry& camera);
 
+/// Irradiance on the detector for a radiance that is even over the field, in its unit per sr.
+[[nodiscard]] double throughput_sr(const OpticsSpec& spec) noexcept;
+
 struct OpticsReport {
   PixelRect window;            ///< where the image may differ from the even background
   int wing_px = 0;             ///< how far the spread of light is followed

@@ -1,5 +1,7 @@
 #include "engine/orbit/sight_line.h"
 
+#include <cmath>
+
 #include "engine/core/constants.h"
 
 namespace engine {
@@ -34,6 +36,13 @@ SightLine sight_line(const Propagator& camera, const Propagator& target, Epoch n
 Rotation<J2000, J2000> without_aberration(const SightLine& line) noexcept {
   return {Eigen::Quaterniond::FromTwoVectors(line.apparent.unit, line.toward_target.unit)
               .toRotationMatrix()};
+}
+
+Eigen::Vector3d aberrated(const Eigen::Vector3d& unit, const Velocity<J2000>& observer) noexcept {
+  const Eigen::Vector3d beta = observer.m_s / kSpeedOfLight_m_s;
+  const double inverse_gamma = std::sqrt(1.0 - beta.squaredNorm());
+  const double along = unit.dot(beta);
+  return (inverse_gamma * unit + (1.0 + along / (1.0 + inverse_gamma)) * beta) / (1.0 + along);
 }
 
 }  // namespace engine

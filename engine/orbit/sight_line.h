@@ -27,4 +27,10 @@ struct SightLine {
 /// The rotation that takes apparent directions near this line to the light's path.
 [[nodiscard]] Rotation<J2000, J2000> without_aberration(const SightLine& line) noexcept;
 
+/// Where an observer at this speed against the solar system's barycentre sees what is so far away
+/// that it stands still: a star. Exact in v/c; Green 1985, Spherical Astronomy, section 8.3.
+/// Leaves out: parallax (at most 0.8"), light deflection by the Sun (1.8" at its limb).
+[[nodiscard]] Eigen::Vector3d aberrated(const Eigen::Vector3d& unit,
+                                        const Velocity<J2000>& observer) noexcept;
+
 }  // namespace engine

@@ -62,6 +62,15 @@ Position<J2000> sun_position(SunModel model, Epoch t) noexcept {
   return model == SunModel::kTable1 ? from_table1(t) : from_erfa(t);
 }
 
+Velocity<J2000> earth_velocity(Epoch t) noexcept {
+  const TwoPartDate tt = terrestrial_time(t);
+  double heliocentric[2][3];
+  double barycentric[2][3];
+  eraEpv00(tt.day1, tt.day2, heliocentric, barycentric);
+  const Eigen::Vector3d au_day(barycentric[1][0], barycentric[1][1], barycentric[1][2]);
+  return {au_day * (kAstronomicalUnit_m / 86400.0)};
+}
+
 double sun_irradiance_w_m2(const SunSpec& spec, double distance_m) noexcept {
   if (!spec.scales_with_distance) return spec.irradiance_1au_w_m2;
   const double au = kAstronomicalUnit_m / distance_m;

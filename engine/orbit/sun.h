@@ -24,6 +24,9 @@ struct SunSpec {
 /// The Sun from the Earth's centre, geometric, in J2000.
 [[nodiscard]] Position<J2000> sun_position(SunModel model, Epoch t) noexcept;
 
+/// The Earth's centre about the solar system's barycentre, in J2000, by eraEpv00: within 5 mm/s.
+[[nodiscard]] Velocity<J2000> earth_velocity(Epoch t) noexcept;
+
 /// Mean place of date by table 1 of Li et al. 2023: the Sun from the Earth's centre on the mean
 /// equator and equinox of date, in metres.
 ///

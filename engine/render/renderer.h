@@ -8,15 +8,10 @@
 #include <vector>
 
 #include "engine/core/image.h"
+#include "engine/scene/point_source.h"
 #include "engine/scene/snapshot.h"
 
 namespace engine {
-
-/// Something without a size on the detector.
-struct PointSource {
-  PixelPoint place;
-  double irradiance_w_m2 = 0;  ///< at the pupil, across the line of sight
-};
 
 /// Light arriving at the entrance pupil: a grid (its region and oversampling are the optics' wish),
 /// a list of point sources at exact sub-pixel places, and what is even over the field.

@@ -30,6 +30,13 @@ struct Lamp {
   double irradiance_w_m2 = 0;   ///< across the beam, in band
 };
 
+/// The camera against the stars.
+struct SkyView {
+  AttitudeTrack attitude;    ///< aberration not taken out: a star's apparent direction is seen
+  Position<J2000> camera;    ///< from the Earth's centre, at mid-exposure
+  Velocity<J2000> velocity;  ///< against the solar system's barycentre; 0: light paths are straight
+};
+
 /// One exposure with its geometry resolved, at mid-exposure.
 struct Snapshot {
   std::uint64_t sequence = 0;
@@ -45,6 +52,8 @@ struct Snapshot {
   double range_rate_m_s = 0;
   double line_of_sight_rate_rad_s = 0;
   double phase_angle_rad = 0;  ///< at the target, between Sun and camera
+
+  SkyView sky;
 
   Lamp sun;                       ///< irradiance 0 in the Earth's shadow
   Lamp earthshine;                ///< irradiance 0 when left out

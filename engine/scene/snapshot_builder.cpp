@@ -73,6 +73,10 @@ Snapshot SnapshotBuilder::build(const Shot& shot) const noexcept {
   const PixelPoint at_close = target_image(shot.shutter_open + shot.exposure, shot.attitude.close);
   out.smear_px = {at_close.u - at_open.u, at_close.v - at_open.v};
 
+  out.sky = {shot.attitude, line.camera.position, {}};
+  if (spec_.light_path == LightPath::kApparent)
+    out.sky.velocity.m_s =
+        line.camera.velocity.m_s + earth_velocity(spec_.epoch + middle.time_since_epoch()).m_s;
   out.background_w_m2_sr = spec_.sky_w_m2_sr;
   out.earth_behind = earth_is_behind(line.camera.position, line.target.position);
   out.roll_is_fallback = shot.attitude.middle.roll_is_fallback;

@@ -35,7 +35,8 @@ starloop::Scenario small_scenario() {
                        "jitter.lines.wheel.frequency_hz=40",
                        "jitter.lines.wheel.amplitude_urad=1",
                        "sensors.star_tracker_across_arcsec=1",
-                       "sensors.gyro_noise_deg_rt_h=0.01"};
+                       "sensors.gyro_noise_deg_rt_h=0.01",
+                       "stars.catalogue=built-in"};
   return starloop::load_scenario(options);
 }
 

@@ -99,6 +99,68 @@ BENCHMARK(bench_frame)
     ->Unit(benchmark::kMillisecond)
     ->UseRealTime();
 
+/// Stars onto the detector of the paper's camera, each 300 e- in a millisecond; footprints a
+/// second.
+void bench_star_footprints(benchmark::State& state) {
+  const starloop::Scenario scenario = flyby();
+  const CameraGeometry& camera = scenario.scene.camera;
+  const double to_e = scenario.detector.electrons_per_irradiance(scenario.run.exposure);
+  const double faint_w_m2 = 0.3 * scenario.detector.noise_e(0.0) / to_e;
+  WorkerPool pool(static_cast<int>(state.range(1)));
+  PointSplat splat(scenario.optics, faint_w_m2, pool);
+  std::vector<PointSource> stars(10000);
+  Draws draws(1, Stream::kShot, 0, 0);
+  for (PointSource& star : stars)
+    star = {{camera.width_px * draws.uniform_double(), camera.height_px * draws.uniform_double()},
+            300.0 / (to_e * splat.pixels_per_irradiance()),
+            {static_cast<double>(state.range(0)), 0.0}};
+  IrradianceImage image(camera.width_px, camera.height_px);
+  std::uint64_t footprints = 0;
+  for (auto _ : state) footprints += splat.add(stars, image).footprints;
+  state.counters["footprints_s"] =
+      benchmark::Counter(static_cast<double>(footprints), benchmark::Counter::kIsRate);
+  state.counters["reach_px"] = splat.reach_px(stars[0].irradiance_w_m2);
+}
+BENCHMARK(bench_star_footprints)
+    ->ArgNames({"streak_px", "threads"})
+    ->ArgsProduct({{0, 10}, {1, 2}})
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
+
+/// Looking the stars of a field up in the built-in catalogue: half a field in milliradians.
+void bench_star_lookup(benchmark::State& state) {
+  CameraGeometry camera;
+  camera.focal_length_m = 0.5 * camera.width_px * camera.pixel_pitch_m /
+                          std::tan(1e-3 * static_cast<double>(state.range(0)));
+  StarSpec spec;
+  spec.source = StarSpec::Source::kBuiltIn;
+  const StarField field(read_star_catalogue(spec, Epoch{}), camera, StarLight(627e-9));
+  SkyView sky;
+  sky.camera.m = {7e6, 0.0, 0.0};
+  const StarLimits limits{0.0, 0.4, 0.0, 5.0, 64.0};
+  std::vector<PointSource> found;
+  found.reserve(131072);
+  std::uint64_t stars = 0;
+  Draws draws(1, Stream::kShot, 0, 0);
+  for (auto _ : state) {
+    const Eigen::Vector3d any(draws.uniform_double() - 0.5, draws.uniform_double() - 0.5,
+                              draws.uniform_double() - 0.5);
+    const CameraAttitude attitude = look_along(direction_of<J2000>(any));
+    sky.attitude = {attitude, attitude, attitude};
+    found.clear();
+    field.find(sky, limits, found);
+    stars += found.size();
+  }
+  state.counters["stars"] =
+      benchmark::Counter(static_cast<double>(stars), benchmark::Counter::kAvgIterations);
+}
+BENCHMARK(bench_star_lookup)
+    ->ArgName("half_field_mrad")
+    ->Arg(1)
+    ->Arg(13)
+    ->Arg(175)
+    ->Unit(benchmark::kMicrosecond);
+
 void bench_frame_packet(benchmark::State& state) {
   const DnImage image(1024, 1024);
   hil::Frame frame;

@@ -39,6 +39,7 @@ std::vector<engine::FitsCard> header_of(const Scenario& s, const RenderOptions& 
       {"BOUNCES", static_cast<long long>(r.render.bounces), "indirect"},
       {"WINGPX", static_cast<long long>(r.optics.wing_px),
        "[px] how far light's spread is followed"},
+      {"STARS", static_cast<long long>(r.stars.in_frame), "in the frame, bright enough to be seen"},
   };
 }
 
@@ -68,6 +69,15 @@ int render_frame(const CommonOptions& options, const RenderOptions& render) {
                 fits.string().c_str(), png.c_str(), t.range_m * 1e-3,
                 t.phase_angle_rad / engine::kDegree, t.peak_e, report.peak_dn,
                 t.sun_irradiance_w_m2 > 0.0 ? "" : ", in the Earth's shadow");
+    if (!rig.star_text().empty()) {
+      const engine::StarReport& stars = report.stars;
+      std::printf(
+          "%s\n%d in the frame, the brightest V %.2f at (%.2f, %.2f), %.0f e-; %d behind the "
+          "Earth; %d too faint, together %.0f e-, at most %.2f e- in a pixel\n",
+          rig.star_text().c_str(), stars.in_frame, stars.brightest_v, stars.brightest_px.u,
+          stars.brightest_px.v, stars.brightest_e, stars.behind_earth, stars.faint,
+          stars.left_out_e, stars.left_out_peak_e);
+    }
     if (t.earth_behind)
       std::printf("The Earth is behind the target here; its light is not drawn yet.\n");
   }

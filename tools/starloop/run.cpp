@@ -24,6 +24,7 @@ void introduce(const Flight::Plan& plan, const Rig& rig, const Flight& flight) {
       engine::utc_text(scenario.scene.epoch + pass.start.time_since_epoch()), seconds(pass.start),
       seconds(pass.end), pass.min_range_m * 1e-3, rig.triangles(), rig.threads(),
       plan.open_loop ? "; open loop" : "");
+  if (!rig.star_text().empty()) spdlog::info("{}", rig.star_text());
   spdlog::info("{}", flight.text());
 }
 

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <thread>
 
+#include "engine/core/constants.h"
 #include "engine/orbit/utc.h"
 #include "engine/render/traced_target.h"
 #include "engine/scene/telescope.h"
@@ -84,6 +85,24 @@ tracker::TrackerSpec read_tracker(const ConfigTable& table, const engine::Camera
   return spec;
 }
 
+/// North is up and east to the left, turned about the boresight by the roll.
+std::optional<engine::CameraAttitude> read_boresight(const ConfigTable& table) {
+  if (!table.has("boresight_ra_deg") && !table.has("boresight_dec_deg")) return std::nullopt;
+  using engine::kDegree;
+  const double ra = table.number("boresight_ra_deg", engine::between(-180.0, 360.0)) * kDegree;
+  const double dec = table.number("boresight_dec_deg", engine::between(-90.0, 90.0)) * kDegree;
+  const double roll =
+      table.number_or("boresight_roll_deg", 0.0, engine::between(-360.0, 360.0)) * kDegree;
+  const Eigen::Vector3d z = engine::unit_at(ra, dec);
+  const Eigen::Vector3d west(std::sin(ra), -std::cos(ra), 0.0);
+  const Eigen::Vector3d south = z.cross(west);
+  engine::CameraAttitude attitude;
+  attitude.axes.matrix.row(0) = std::cos(roll) * west + std::sin(roll) * south;
+  attitude.axes.matrix.row(1) = std::cos(roll) * south - std::sin(roll) * west;
+  attitude.axes.matrix.row(2) = z;
+  return attitude;
+}
+
 engine::Mesh load_mesh(const Scenario& scenario) {
   if (scenario.mesh == "telescope") return engine::telescope_mesh();
   engine::MeshReport report;
@@ -97,6 +116,17 @@ engine::Mesh load_mesh(const Scenario& scenario) {
     std::fprintf(stderr, "%s: %zu faces left out: %zu not finite, %zu without area\n",
                  scenario.mesh.c_str(), report.left_out(), report.not_finite, report.zero_area);
   return mesh;
+}
+
+std::string text_of(const engine::StarCatalogue& stars, const engine::CameraGeometry& camera) {
+  char text[240];
+  std::snprintf(text, sizeof text,
+                "%zu stars; %zu without a colour of their own, %zu without proper motion: half of "
+                "these are off by more than %.2f\" = %.2f px",
+                stars.stars.size(), stars.without_colour, stars.without_motion,
+                stars.median_error_rad() / engine::kDegree * 3600.0,
+                stars.median_error_rad() / camera.ifov_rad());
+  return text;
 }
 
 int worker_threads(int wanted) {
@@ -132,6 +162,7 @@ Scenario read_scenario(const ConfigReader& config) {
   s.scene.target_offsets = engine::read_offsets(config.table("target"));
   s.scene.sky_w_m2_sr =
       config.table("sky").number_or("radiance_w_m2_sr", 0.0, engine::at_least(0.0));
+  s.stars = engine::read_stars(config.table("stars"));
   const ConfigTable visibility = config.table("visibility");
   s.visibility = engine::read_visibility(visibility, s.scene.sun.model,
                                          s.scene.camera.half_diagonal_field_rad());
@@ -153,6 +184,7 @@ Scenario read_scenario(const ConfigReader& config) {
                .choice_or<hil::RollRule>("roll", "celestial",
                                          {{"celestial", hil::RollRule::kCelestial},
                                           {"vertical", hil::RollRule::kVertical}});
+  s.boresight = read_boresight(config.table("guidance"));
   s.actuator = hil::read_actuator(config.table("actuator"));
   s.realtime = hil::read_realtime(config.table("realtime"));
   s.link = drivers::read_link(config.table("link"));
@@ -189,6 +221,7 @@ Rig::Rig(const Scenario& scenario, int threads)
     : epoch_(scenario.scene.epoch),
       path_(scenario.scene.light_path),
       roll_(scenario.roll),
+      boresight_(scenario.boresight),
       camera_(scenario.camera_orbit, epoch_),
       target_(scenario.target_orbit, epoch_),
       believed_target_(target_, scenario.target_knowledge),
@@ -216,17 +249,29 @@ Rig::Rig(const Scenario& scenario, int threads)
   } catch (const engine::ConfigError& e) {
     throw engine::ConfigError(scenario.mesh_where + ": " + e.what());
   }
+  std::unique_ptr<engine::Starlight> stars;
+  if (scenario.stars.source != engine::StarSpec::Source::kNone) {
+    const engine::StarCatalogue catalogue =
+        engine::read_star_catalogue(scenario.stars, scenario.scene.epoch);
+    star_text_ = text_of(catalogue, scenario.scene.camera);
+    stars = std::make_unique<engine::Starlight>(
+        engine::StarField(catalogue, scenario.scene.camera,
+                          engine::StarLight(detector.mean_wavelength_m)),
+        engine::PointSplat(scenario.optics, faint_w_m2, pool_), detector);
+  }
   generator_ = std::make_unique<engine::ImagingChain>(
       engine::SnapshotBuilder(scenario.scene, camera_, target_),
       engine::make_renderer(render, std::move(target), pool_), std::move(optics),
       engine::Detector(detector, pool_), detector, scenario.scene.camera,
-      &hil::SteadyClock::stopwatch);
+      &hil::SteadyClock::stopwatch, std::move(stars));
 }
 
-hil::ScriptedPointing Rig::prediction() const { return {camera_, target_, epoch_, path_, roll_}; }
+hil::ScriptedPointing Rig::prediction() const {
+  return {camera_, target_, epoch_, path_, roll_, boresight_};
+}
 
 hil::ScriptedPointing Rig::believed() const {
-  return {camera_, believed_target_, epoch_, path_, roll_};
+  return {camera_, believed_target_, epoch_, path_, roll_, boresight_};
 }
 
 hil::ClosedLoopPointing make_pointing(const Scenario& scenario, const Rig& rig,

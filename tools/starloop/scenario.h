@@ -72,11 +72,13 @@ struct Scenario {
   std::vector<engine::Material> materials;
   engine::RenderSpec render;
   engine::OpticsSpec optics;
+  engine::StarSpec stars;
   engine::DetectorSpec detector;
   hil::GuidanceError guidance;
   hil::GuidanceMode mode = hil::GuidanceMode::kPredictedTarget;
   hil::TargetKnowledge target_knowledge;
   hil::RollRule roll = hil::RollRule::kCelestial;
+  std::optional<engine::CameraAttitude> boresight;  ///< in the sky, instead of the target
   hil::ActuatorSpec actuator;
   hil::RealtimeSpec realtime;
   drivers::LinkSpec link;
@@ -124,16 +126,20 @@ class Rig {
   [[nodiscard]] const engine::KeplerPropagator& target() const noexcept { return target_; }
   [[nodiscard]] int threads() const noexcept { return pool_.threads(); }
   [[nodiscard]] std::size_t triangles() const noexcept { return triangles_; }
+  /// A line about the catalogue of stars; empty when there is none.
+  [[nodiscard]] const std::string& star_text() const noexcept { return star_text_; }
 
  private:
   engine::Epoch epoch_;
   engine::LightPath path_;
   hil::RollRule roll_;
+  std::optional<engine::CameraAttitude> boresight_;
   engine::KeplerPropagator camera_;
   engine::KeplerPropagator target_;
   hil::BelievedTarget believed_target_;
   engine::WorkerPool pool_;
   std::size_t triangles_ = 0;
+  std::string star_text_;
   std::unique_ptr<engine::SceneGenerator> generator_;
 };
 

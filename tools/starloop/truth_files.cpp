@@ -34,6 +34,20 @@ std::string picture_name(std::uint64_t sequence) {
   return name;
 }
 
+/// The brightest is null where there is none in the frame.
+Json stars_of(const engine::StarReport& stars) {
+  Json brightest;
+  if (stars.in_frame > 0)
+    brightest = {{"place_px", place(stars.brightest_px)},
+                 {"v", stars.brightest_v},
+                 {"light_e", stars.brightest_e}};
+  return {{"in_frame", stars.in_frame},
+          {"too_faint", stars.faint},
+          {"too_faint_peak_e", stars.left_out_peak_e},
+          {"no_room", stars.no_room},
+          {"brightest", std::move(brightest)}};
+}
+
 Json truth_of(const hil::FrameRecord& record) {
   const engine::FrameTruth& t = record.report.truth;
   const hil::MeasuredAttitude& m = record.measured;
@@ -58,6 +72,7 @@ Json truth_of(const hil::FrameRecord& record) {
       {"earthshine_w_m2", t.earthshine_w_m2},
       {"earth_behind", t.earth_behind},
       {"roll_is_fallback", t.roll_is_fallback},
+      {"stars", stars_of(record.report.stars)},
       {"trim_rad", record.trim_rad},
       {"measured_j2000_to_camera_wxyz", m.j2000_to_camera},
       {"measured_rate_rad_s", m.rate_rad_s}};

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "engine/core/constants.h"
 #include "engine/scene/camera_geometry.h"
 #include "tests/support/csv.h"
 #include "tests/support/scenes.h"
@@ -116,6 +117,18 @@ TEST(SightLine, AberrationCanBeTakenOutAgain) {
   const SightLine plain =
       sight_line(flyby.camera, flyby.target, flyby.at(kClosestOfPass3_s), LightPath::kGeometric);
   EXPECT_LT((without_aberration(plain).matrix - Eigen::Matrix3d::Identity()).norm(), 1e-15);
+}
+
+TEST(SightLine, AStarIsSeenWhereLorentzPutsIt) {
+  for (const Vector3d& speed_m_s :
+       {Vector3d(0, 0, 0), Vector3d(30e3, 0, 0), Vector3d(-9e3, 2e4, 7e3),
+        Vector3d(0, 0, 0.6 * kSpeedOfLight_m_s)}) {
+    for (const Vector3d& star : {Vector3d(1, 0, 0), Vector3d(-1, 0, 0), Vector3d(0, 0.6, 0.8)}) {
+      const Vector3d seen = engine::aberrated(star, Velocity<J2000>{speed_m_s});
+      EXPECT_LT((seen - aberrated(star, speed_m_s / kSpeedOfLight_m_s)).norm(), 1e-15);
+      EXPECT_NEAR(seen.norm(), 1.0, 1e-15);
+    }
+  }
 }
 
 }  // namespace

@@ -161,5 +161,21 @@ TEST(ReadSun, KnowsTheThreeKindsOfIrradiance) {
   EXPECT_THROW(read("irradiance = \"bright\""), ConfigError);
 }
 
+TEST(Sun, TheEarthsVelocityIsThatOfItsPlaceAndTheSunsOwn) {
+  const Epoch start = epoch_from_utc("2022-01-01T00:00:00").value();
+  for (int month = 0; month < 12; ++month) {
+    const Epoch t = start + from_seconds(month * 30.4 * 86400.0);
+    const Duration hour = from_seconds(3600.0);
+    // The Earth from the Sun, by differences: half an hour of curvature leaves 1e-3 m/s.
+    const Eigen::Vector3d round_the_sun =
+        (sun_position(SunModel::kErfa, t - hour).m - sun_position(SunModel::kErfa, t + hour).m) /
+        7200.0;
+    const double suns_own = (earth_velocity(t).m_s - round_the_sun).norm();
+    // The Sun goes round the barycentre, for Jupiter's and Saturn's sake, at 9 to 16 m/s.
+    EXPECT_GT(suns_own, 5.0) << month;
+    EXPECT_LT(suns_own, 20.0) << month;
+  }
+}
+
 }  // namespace
 }  // namespace engine
