@@ -30,7 +30,7 @@ std::vector<engine::FitsCard> header_of(const Scenario& s, const RenderOptions& 
       {"PHASE", t.phase_angle_rad / engine::kDegree, "[deg] Sun, target, camera"},
       {"SUNIRR", t.sun_irradiance_w_m2, "[W/m2] 450-850 nm, at the target"},
       {"EARTHIRR", t.earthshine_w_m2, "[W/m2] vector irradiance of the Earth"},
-      {"EARTHBG", static_cast<long long>(t.earth_behind), "1: the Earth is behind (not drawn)"},
+      {"EARTHBG", static_cast<long long>(t.earth_behind), "1: the Earth is behind the target"},
       {"TARGETU", t.target_px.u, "[px] image of the target's centre, from 0"},
       {"TARGETV", t.target_px.v, "[px] image of the target's centre, from 0"},
       {"SMEAR", t.smear_px, "[px] over the exposure"},
@@ -68,8 +68,6 @@ int render_frame(const CommonOptions& options, const RenderOptions& render) {
                 fits.string().c_str(), png.c_str(), t.range_m * 1e-3,
                 t.phase_angle_rad / engine::kDegree, t.peak_e, report.peak_dn,
                 t.sun_irradiance_w_m2 > 0.0 ? "" : ", in the Earth's shadow");
-    if (t.earth_behind)
-      std::printf("The Earth is behind the target here; its light is not drawn yet.\n");
   }
   return kGood;
 }

@@ -132,7 +132,7 @@ void write_report(const std::filesystem::path& folder, const Scenario& s, const 
       {"statistics", statistics_json(log)},
       {"detection", detection_json(v.detection)},
       {"left_out",
-       {"the Earth and stars behind the target", "defocus", "the Sun's disc",
+       {"stars behind the target", "defocus", "the Sun's disc",
         "PRNU, DSNU and defects"}},
       {"criteria_met", open_loop ? nlohmann::json(nullptr) : nlohmann::json(v.good)}};
   std::ofstream(folder / "report.json") << report.dump(2) << "\n";
