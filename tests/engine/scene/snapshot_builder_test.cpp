@@ -278,6 +278,25 @@ TEST(SnapshotBuilder, TheEarthLightIsThatOfTheLampInBodyAxes) {
   }
 }
 
+TEST(SnapshotBuilder, TheCameraSeesTheEarthWhereItsRaysToTheTargetSayItIs) {
+  // Aberration is taken out of both in one way.
+  const Flyby flyby;
+  SceneSpec spec = spec_of(flyby);
+  spec.earth.earthshine = EarthshineModel::kCap;
+  const SnapshotBuilder builder(spec, flyby.camera, flyby.target);
+  for (const double t_s : {kClosestOfPass3_s - 10.0, kClosestOfPass3_s, kClosestOfPass3_s + 10.0}) {
+    const Snapshot s = builder.build(tracked_shot(flyby, t_s));
+    ASSERT_FALSE(s.earth.dark());
+    const EarthDisc<BodyFrame>& below = s.earth.disc();
+    const Vector3d centre_m = below.distance_radii * kEarthRadius_m * below.to_centre.unit;
+    const Vector3d from_camera = (centre_m - s.camera.m).normalized();
+    const EarthDisc<CameraFrame>& seen = s.earth_in_frame.disc;
+    const Vector3d by_rays = s.body_from_camera.matrix * seen.to_centre.unit;
+    EXPECT_LT((by_rays - from_camera).norm(), 1e-12);  // roundings; a pixel is 1.4e-6
+    EXPECT_NEAR(seen.distance_radii, (centre_m - s.camera.m).norm() / kEarthRadius_m, 1e-12);
+  }
+}
+
 TEST(SnapshotBuilder, PassesTheFallbackOfTheRollOn) {
   const Flyby flyby;
   const SnapshotBuilder builder(spec_of(flyby), flyby.camera, flyby.target);
