@@ -15,7 +15,7 @@ struct LightSums {
     sum += light;
     sum_u += light * u;
     sum_v += light * v;
-    peak = std::max(peak, light);
+    peak = std::max(peak, std::abs(light));
   }
 };
 
@@ -44,11 +44,13 @@ ImagingChain::ImagingChain(const SnapshotBuilder& scene, std::unique_ptr<Rendere
       stopwatch_(stopwatch),
       stars_(std::move(stars)),
       irradiance_(camera.width_px, camera.height_px),
-      electrons_(camera.width_px, camera.height_px) {
+      electrons_(camera.width_px, camera.height_px),
+      behind_w_m2_(static_cast<std::size_t>(camera.width_px)) {
   const GridWish wish = optics_.wish();
   const PixelRect most = camera.frame().grown_by(wish.beyond_frame_px);
   radiance_.grid.reserve(most.width() * wish.oversampling, most.height() * wish.oversampling);
   radiance_.cover.reserve(most.width() * wish.oversampling, most.height() * wish.oversampling);
+  radiance_.earth.reserve(camera, wish.beyond_frame_px);
 }
 
 FrameReport ImagingChain::expose(const Shot& shot, Budget budget, DnImage& out,
@@ -57,6 +59,7 @@ FrameReport ImagingChain::expose(const Shot& shot, Budget budget, DnImage& out,
   const Duration start = now();
   const Snapshot snapshot = scene_.build(shot);
   const Duration built = now();
+  radiance_.earth.draw(snapshot.earth_in_frame, snapshot.background_w_m2_sr);
   report.render = renderer_->render(snapshot, budget, radiance_);
   const Duration rendered = now();
   report.optics = optics_.project(radiance_, irradiance_);
@@ -88,23 +91,35 @@ FrameReport ImagingChain::expose(const Shot& shot, Budget budget, DnImage& out,
 }
 
 void ImagingChain::measure_light(const PixelRect& window, Duration exposure, FrameTruth& truth,
-                                 TruthMask& mask) const noexcept {
+                                 TruthMask& mask) noexcept {
   mask.clear();
   const double to_e = detector_spec_.electrons_per_irradiance(exposure);
-  const double background = radiance_.uniform_w_m2_sr * optics_.throughput_sr();
-  const double noise_e =
-      detector_spec_.noise_e(background * to_e + detector_spec_.dark_e_s * seconds(exposure));
-  const double faint = noise_e / to_e;
+  const double sky = radiance_.uniform_w_m2_sr * optics_.throughput_sr();
+  const double dark_e = detector_spec_.dark_e_s * seconds(exposure);
+  const bool before_earth = !radiance_.earth.empty();
+  double background = sky;
+  double noise_e = detector_spec_.noise_e(background * to_e + dark_e);
   LightSums all;
   double in_mask = 0;
+  double variance_e2 = 0;
+  const auto throughput = static_cast<float>(optics_.throughput_sr());
   for (int v = window.top; v < window.bottom; ++v) {
     const auto row = irradiance_.row(v);
+    if (before_earth) {
+      std::ranges::fill(behind_w_m2_, static_cast<float>(sky));
+      radiance_.earth.add_row(v, 0, throughput, behind_w_m2_);
+    }
     int begin = -1;  // of the run that we are in
     for (int u = window.left; u < window.right; ++u) {
+      if (before_earth) {
+        background = static_cast<double>(behind_w_m2_[static_cast<std::size_t>(u)]);
+        noise_e = detector_spec_.noise_e(background * to_e + dark_e);
+      }
       const double light = static_cast<double>(row[static_cast<std::size_t>(u)]) - background;
       all.add(light, u, v);
-      if (light > faint) {
-        in_mask += light;
+      if (std::abs(light) * to_e > noise_e) {
+        in_mask += std::abs(light);
+        variance_e2 += light * to_e + noise_e * noise_e;
         if (begin < 0) begin = u;
       } else if (begin >= 0) {
         add_run({begin, v, u, v + 1}, truth, mask);
@@ -115,10 +130,37 @@ void ImagingChain::measure_light(const PixelRect& window, Duration exposure, Fra
   }
   truth.peak_e = all.peak * to_e;
   // Less than one electron in the whole frame is no target: rounding of the transform, at most.
-  if (all.sum * to_e > 1.0) truth.photocentre_px = {all.sum_u / all.sum, all.sum_v / all.sum};
-  if (truth.mask_px == 0) return;
-  const double signal_e = in_mask * to_e;
-  truth.signal_to_noise = signal_e / std::sqrt(signal_e + truth.mask_px * noise_e * noise_e);
+  if (before_earth) {
+    find_own_photocentre(to_e, truth);
+  } else if (all.sum * to_e > 1.0) {
+    truth.photocentre_px = {all.sum_u / all.sum, all.sum_v / all.sum};
+  }
+  if (truth.mask_px > 0) truth.signal_to_noise = in_mask * to_e / std::sqrt(variance_e2);
+}
+
+void ImagingChain::find_own_photocentre(double e_per_irradiance, FrameTruth& truth) const noexcept {
+  const PixelRect& region = radiance_.region;
+  const int s = radiance_.oversampling;
+  LightSums own;
+  for (int v = std::max(0, region.top); v < std::min(irradiance_.height(), region.bottom); ++v) {
+    for (int line = 0; line < s; ++line) {
+      const auto cells = radiance_.grid.row((v - region.top) * s + line);
+      double light = 0;
+      double moment = 0;
+      const int first = std::max(0, -region.left) * s;
+      const int end = (std::min(irradiance_.width(), region.right) - region.left) * s;
+      for (int i = first; i < end; ++i) {
+        const double cell = static_cast<double>(cells[static_cast<std::size_t>(i)]);
+        light += cell;
+        moment += cell * (i + 0.5);
+      }
+      own.sum += light;
+      own.sum_u += moment / s + light * (region.left - 0.5);
+      own.sum_v += light * (v + (line + 0.5) / s - 0.5);
+    }
+  }
+  const double to_e = optics_.throughput_sr() * e_per_irradiance / (s * s);
+  if (own.sum * to_e > 1.0) truth.photocentre_px = {own.sum_u / own.sum, own.sum_v / own.sum};
 }
 
 }  // namespace engine

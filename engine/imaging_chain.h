@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <vector>
 
 #include "engine/detector/detector.h"
 #include "engine/optics/optics.h"
@@ -30,7 +31,9 @@ class ImagingChain final : public SceneGenerator {
   /// What is known of the target's light once it has been blurred: truth from peak_e to
   /// signal_to_noise, and the photocentre.
   void measure_light(const PixelRect& window, Duration exposure, FrameTruth& truth,
-                     TruthMask& mask) const noexcept;
+                     TruthMask& mask) noexcept;
+  /// The centre of the light of the grid that falls into the frame; as it was when there is none.
+  void find_own_photocentre(double e_per_irradiance, FrameTruth& truth) const noexcept;
 
   SnapshotBuilder scene_;
   std::unique_ptr<Renderer> renderer_;
@@ -42,6 +45,7 @@ class ImagingChain final : public SceneGenerator {
   Radiance radiance_;
   IrradianceImage irradiance_;
   ElectronImage electrons_;
+  std::vector<float> behind_w_m2_;  ///< a row of the background, on the detector
 };
 
 }  // namespace engine

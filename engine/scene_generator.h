@@ -21,14 +21,15 @@ struct FrameTruth {
   double phase_angle_rad = 0;
   PixelPoint target_px;  ///< the image of the target's centre, in or out of the frame
   /// The centre of the target's light on the detector, free of noise and not clipped at full well;
-  /// not a number when none of it falls there.
+  /// not a number when none of it falls there. With the Earth in the frame, that of the light
+  /// before it is blurred: the same but where the frame's edge cuts the target.
   PixelPoint photocentre_px{std::numeric_limits<double>::quiet_NaN(),
                             std::numeric_limits<double>::quiet_NaN()};
   double smear_px = 0;
-  double peak_e = 0;  ///< of the target's light
+  double peak_e = 0;  ///< of the target's light, as below
   PixelRect box;      ///< around the mask; empty when the mask is
   int mask_px = 0;    ///< pixels of the mask, of those too that it had no room for
-  /// Of all the mask's light against its shot noise and the dark pixels' own; 0 without a mask.
+  /// Of all the mask's light against its shot noise and that of the background; 0 without a mask.
   double signal_to_noise = 0;
   double visible_fraction = 0;  ///< RenderReport's: of the target, in the frame, lit or not
   double sun_irradiance_w_m2 = 0;
@@ -37,8 +38,9 @@ struct FrameTruth {
   bool roll_is_fallback = false;
 };
 
-/// The pixels where the target's light, free of noise, is above one sigma of a dark pixel's noise:
-/// one that sees the even background only. As runs of
+/// The pixels where the target's light, free of noise, is above one sigma of the noise of a pixel
+/// that sees the background only. Before the Earth the target's light is what it sends less what it
+/// hides, and stands out from one sigma either way. As runs of
 /// columns [begin, end), row by row from the top. Adding never allocates; what is too much is lost,
 /// and the mask says so.
 class TruthMask {

@@ -78,6 +78,7 @@ Optics::Optics(const OpticsSpec& spec, double faint_w_m2, WorkerPool& pool)
   line_in_.assign(at(shares), std::vector<Complex>(at(longest)));
   line_out_.assign(at(shares), std::vector<Complex>(at(longest)));
   line_real_.assign(at(shares), std::vector<float>(at(longest)));
+  behind_.assign(at(shares), std::vector<float>(at(side)));
   // Of these the system hands out real memory only for what a frame uses.
   spectrum_.resize(at(longest) * (at(longest) / 2 + 1));
   folded_.resize(at(longest / kOversampling) * (at(longest / kOversampling) / 2 + 1));
@@ -111,6 +112,13 @@ void Optics::share(int count, const Work& work) noexcept {
 int Optics::wing_for(const Radiance& in) const noexcept {
   double flux = 0;  // of the target, in pixels of even irradiance
   for (const float cell : in.grid.pixels()) flux += static_cast<double>(cell);
+  if (!in.earth.empty() && !in.region.empty()) {
+    // What is hidden spreads as what is sent does; the two together bound their difference.
+    double hidden = 0;
+    for (const float cell : in.cover.pixels()) hidden += static_cast<double>(cell);
+    flux += hidden * std::abs(in.earth.at({0.5 * (in.region.left + in.region.right),
+                                           0.5 * (in.region.top + in.region.bottom)}));
+  }
   flux *= throughput_sr_ / (kOversampling * kOversampling);
   const double points_to_flux = throughput_sr_ / std::pow(spec_.camera.ifov_rad(), 2);
   for (const PointSource& p : in.points) flux += p.irradiance_w_m2 * points_to_flux;
@@ -145,6 +153,11 @@ OpticsReport Optics::project(const Radiance& in, IrradianceImage& out) noexcept 
   out.resize(spec_.camera.width_px, spec_.camera.height_px);
   std::fill(out.pixels().begin(), out.pixels().end(),
             static_cast<float>(in.uniform_w_m2_sr * throughput_sr_));
+  if (!in.earth.empty()) {
+    share(out.height(), [&](std::size_t, int v) {
+      in.earth.add_row(v, 0, static_cast<float>(throughput_sr_), out.row(v));
+    });
+  }
   OpticsReport report;
   if (in.region.empty()) return report;
 
@@ -164,12 +177,25 @@ OpticsReport Optics::project(const Radiance& in, IrradianceImage& out) noexcept 
   return report;
 }
 
+/// A row of the grid without what the target hides. `behind` is for the background's pixels.
+void Optics::copy_cells(const Radiance& in, int row, std::span<float> behind,
+                        std::span<float> line) const noexcept {
+  const auto cells = in.grid.row(row);
+  std::copy(cells.begin(), cells.end(), line.begin());
+  if (in.earth.empty()) return;
+  std::fill(behind.begin(), behind.end(), static_cast<float>(in.uniform_w_m2_sr));
+  in.earth.add_row(in.region.top + row / kOversampling, in.region.left, 1.0F, behind);
+  const auto cover = in.cover.row(row);
+  for (std::size_t i = 0; i < line.size(); ++i) line[i] -= cover[i] * behind[i / at(kOversampling)];
+}
+
 void Optics::transform_rows(const Radiance& in, const Grid& grid) noexcept {
   // The middle cell of a pixel is its centre; it must fall on every third cell of the grid, so the
   // first cell of the region lies one before.
   const int first_column = (in.region.left - grid.left) * kOversampling - 1;
   const int first_row = (in.region.top - grid.top) * kOversampling - 1;
   const int rows = in.grid.height();
+  ENSURE(in.earth.empty() || in.cover.pixels().size() == in.grid.pixels().size());
   share(grid.columns, [&](std::size_t, int column) {
     const auto line = spectrum_.begin() + static_cast<std::ptrdiff_t>(column) * grid.cells_y();
     std::fill(line, line + first_row, Complex{});
@@ -178,8 +204,8 @@ void Optics::transform_rows(const Radiance& in, const Grid& grid) noexcept {
   share(rows, [&](std::size_t s, int row) {
     const auto line = std::span(line_real_[s]).first(at(grid.cells_x()));
     std::fill(line.begin(), line.end(), 0.0F);
-    const auto cells = in.grid.row(row);
-    std::copy(cells.begin(), cells.end(), line.begin() + first_column);
+    copy_cells(in, row, std::span(behind_[s]).first(at(in.region.width())),
+               line.subspan(at(first_column), at(in.grid.width())));
     const auto half = std::span(line_out_[s]).first(line.size() / 2 + 1);
     lines_[s].forward(std::span<const float>(line), half);
     for (int column = 0; column < grid.columns; ++column)

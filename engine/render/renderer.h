@@ -14,7 +14,9 @@
 namespace engine {
 
 /// Light arriving at the entrance pupil: a grid (its region and oversampling are the optics' wish),
-/// a list of point sources at exact sub-pixel places, and what is even over the field.
+/// a list of point sources at exact sub-pixel places, and what lies behind them: what is even over
+/// the field, and the Earth. The grid is the target's own light; what it hides of the Earth the
+/// optics take away.
 /// A grid cell holds the mean radiance over its own area, oversampling^2 cells to a pixel; the
 /// cells of pixel (u, v) start at (oversampling * (u - region.left), ...).
 struct Radiance {
@@ -24,6 +26,8 @@ struct Radiance {
   CoverImage cover;  ///< of the same cells: what lies behind them shows through the rest
   std::vector<PointSource> points;  ///< inside the region
   double uniform_w_m2_sr = 0;
+  /// Behind it all, and none of the renderer's business: the imaging chain draws it.
+  EarthBackground earth;
   PixelPoint motion_px;  ///< how the image moves from shutter open to shutter close
 };
 

@@ -1,57 +1,69 @@
 #include "engine/scene/earth.h"
 
 #include <cmath>
+#include <limits>
 
 #include "engine/core/constants.h"
 
 namespace engine {
+
+std::string_view name_of(EarthshineModel model) noexcept {
+  constexpr std::array<std::string_view, 6> kNames{"none",      "paper-lamp", "vector",
+                                                   "harmonics", "cap",        "auto"};
+  return kNames[static_cast<std::size_t>(model)];
+}
 
 EarthSpec read_earth(const ConfigTable& table) {
   EarthSpec spec;
   spec.earthshine = table.choice_or<EarthshineModel>("earthshine", "vector",
                                                      {{"none", EarthshineModel::kNone},
                                                       {"paper-lamp", EarthshineModel::kPaperLamp},
-                                                      {"vector", EarthshineModel::kVector}});
-  spec.albedo = table.number_or("albedo", 0.3, between(0.0, 1.0));
+                                                      {"vector", EarthshineModel::kVector},
+                                                      {"harmonics", EarthshineModel::kHarmonics},
+                                                      {"cap", EarthshineModel::kCap},
+                                                      {"auto", EarthshineModel::kAuto}});
+  if (table.is_text("albedo")) {
+    spec.albedo_by_latitude = table.choice_or<bool>("albedo", "map", {{"map", true}});
+  } else {
+    spec.albedo = table.number_or("albedo", 0.3, between(0.0, 1.0));
+  }
+  spec.in_frame = table.choice_or<bool>("in_frame", "auto", {{"auto", true}, {"no", false}});
+  spec.air.optical_depth =
+      table.number_or("air_optical_depth", spec.air.optical_depth, between(0.0, 10.0));
   return spec;
 }
 
-Eigen::Vector3d earthshine_vector(const Position<J2000>& target, const Direction<J2000>& to_sun,
-                                  double albedo, double sun_irradiance) noexcept {
-  using Eigen::Vector3d;
-  constexpr int kRings = 72;
-  constexpr int kSectors = 96;
-  const double r = target.m.norm() / kEarthRadius_m;
-  if (!(r > 1.0)) return Vector3d::Zero();
+ZonalAlbedo zonal_albedo(Epoch t) noexcept {
+  constexpr double kDecember22Of1981_d = -6584.5;  // from 2000-01-01T12
+  constexpr double kYear_d = 365.25;
+  const double days = seconds(t.time_since_epoch()) / 86400.0 - kDecember22Of1981_d;
+  return {{0.34, 0.10 * std::cos(2.0 * kPi * days / kYear_d), 0.29}};
+}
 
-  // A frame round the nadir, its x axis towards the Sun so that the terminator lies evenly.
-  const Vector3d up = target.m.normalized();
-  Vector3d x = to_sun.unit - to_sun.unit.dot(up) * up;
-  x = x.norm() > 1e-9 ? x.normalized() : up.unitOrthogonal();
-  const double sun_up = to_sun.unit.dot(up);
-  const double sun_x = to_sun.unit.dot(x);
-
-  // Midpoints of the directions in the cap: the integral is over solid angle as seen from above.
-  const double cos_limb = std::sqrt(1.0 - 1.0 / (r * r));
-  double sum_nadir = 0;
-  double sum_x = 0;
-  for (int i = 0; i < kRings; ++i) {
-    // Rings are denser at the limb, where a low Sun lights the cap.
-    const double s = (i + 0.5) / kRings;
-    const double cos_n = 1.0 - (1.0 - cos_limb) * s * (2.0 - s);
-    const double ring_sr = (1.0 - cos_limb) * 2.0 * (1.0 - s) / kRings * (2.0 * kPi / kSectors);
-    const double sin_n = std::sqrt(1.0 - cos_n * cos_n);
-    const double slant = r * cos_n - std::sqrt(std::max(0.0, 1.0 - r * r * sin_n * sin_n));
-    for (int j = 0; j < kSectors; ++j) {
-      const double azimuth = 2.0 * kPi * (j + 0.5) / kSectors;
-      const double dx = sin_n * std::cos(azimuth);
-      const double cos_sun = sun_x * slant * dx + sun_up * (r - slant * cos_n);
-      if (cos_sun <= 0.0) continue;
-      sum_nadir += ring_sr * cos_sun * cos_n;
-      sum_x += ring_sr * cos_sun * dx;
-    }
+EarthshineChoice choose_earthshine(EarthshineModel wanted, const EarthLight& light,
+                                   const EarthshineSensor& sensor) noexcept {
+  const double diffuse_e =
+      sensor.e_per_radiance * sensor.diffuse_albedo *
+      std::min(light.scalar_irradiance_w_m2() / kPi, light.largest_radiance_w_m2_sr());
+  const double glossy_e =
+      sensor.e_per_radiance * sensor.glossy_albedo * light.largest_radiance_w_m2_sr();
+  const double all_e = diffuse_e + glossy_e;
+  const double harmonics_e = sensor.e_per_radiance * sensor.diffuse_albedo / kPi *
+                                 EarthLight::kHarmonicsError * light.scalar_irradiance_w_m2() +
+                             glossy_e;
+  const bool known = sensor.e_per_radiance > 0.0;
+  if (wanted == EarthshineModel::kAuto) {
+    const double unseen_e = sensor.unseen_sigmas * std::sqrt(sensor.dark_variance_e2 + all_e);
+    wanted = EarthshineModel::kCap;
+    if (known && harmonics_e <= unseen_e) wanted = EarthshineModel::kHarmonics;
+    if (light.dark() || (known && all_e <= unseen_e)) wanted = EarthshineModel::kNone;
   }
-  return albedo * sun_irradiance / kPi * (sum_x * x - sum_nadir * up);
+  const bool exact =
+      wanted == EarthshineModel::kCap || (light.dark() && wanted != EarthshineModel::kPaperLamp);
+  if (exact) return {wanted, 0.0};
+  if (!known || wanted == EarthshineModel::kPaperLamp)
+    return {wanted, std::numeric_limits<double>::quiet_NaN()};
+  return {wanted, wanted == EarthshineModel::kHarmonics ? harmonics_e : all_e};
 }
 
 Eigen::Vector3d paper_earth_lamp(const Position<J2000>& target, double albedo,

@@ -6,6 +6,7 @@
 #include "engine/core/time.h"
 #include "engine/core/vec.h"
 #include "engine/orbit/attitude.h"
+#include "engine/scene/earth_background.h"
 
 namespace engine {
 
@@ -55,10 +56,15 @@ struct Snapshot {
 
   SkyView sky;
 
-  Lamp sun;                       ///< irradiance 0 in the Earth's shadow
-  Lamp earthshine;                ///< irradiance 0 when left out
+  Lamp sun;         ///< irradiance 0 in the Earth's shadow
+  Lamp earthshine;  ///< irradiance 0 when left out
+  /// Earthshine again, as the rung has it: for kHarmonics and kCap a renderer that can uses this
+  /// instead of the lamp, which then holds its vector irradiance. Dark for the other rungs.
+  EarthLight earth;
+  EarthshineChoice earthshine_rung;
   double background_w_m2_sr = 0;  ///< even over the field
-  bool earth_behind = false;      ///< the field has the Earth in it, not only space
+  EarthInFrame earth_in_frame;    ///< seen from the camera; not drawn: not seen
+  bool earth_behind = false;      ///< the line of sight meets the Earth beyond the target
   bool roll_is_fallback = false;
 };
 

@@ -26,8 +26,8 @@ Rotation<BodyFrame, J2000> SnapshotBuilder::body_axes(const OrbitState& target) 
   return body_offset(spec_.target_offsets) * orbital_frame(target);
 }
 
-void SnapshotBuilder::light_up(const SightLine& line, Snapshot& out) const noexcept {
-  const Position<J2000> sun = sun_position(spec_.sun.model, line.emitted);
+void SnapshotBuilder::light_up(const SightLine& line, const Position<J2000>& sun,
+                               Snapshot& out) const noexcept {
   const Eigen::Vector3d to_sun_m = sun.m - line.target.position.m;
   const Direction<J2000> to_sun = direction_of<J2000>(to_sun_m);
   const double irradiance = sun_irradiance_w_m2(spec_.sun, to_sun_m.norm());
@@ -36,24 +36,51 @@ void SnapshotBuilder::light_up(const SightLine& line, Snapshot& out) const noexc
   const bool lit = shadow_margin_m(line.target.position, sun) > 0.0;
   out.sun = {axes * to_sun, lit ? irradiance : 0.0};
   out.phase_angle_rad = angle_between_rad(to_sun.unit, -line.toward_target.unit);
-  switch (spec_.earth.earthshine) {
-    case EarthshineModel::kNone:
-      break;
-    case EarthshineModel::kPaperLamp:
-      out.earthshine =
-          lamp_of(paper_earth_lamp(line.target.position, spec_.earth.albedo, irradiance), axes);
-      break;
-    case EarthshineModel::kVector:
-      out.earthshine = lamp_of(
-          earthshine_vector(line.target.position, to_sun, spec_.earth.albedo, irradiance), axes);
-      break;
+  light_by_earth(line, sun, axes, out);
+}
+
+template <class Frame>
+EarthDisc<Frame> SnapshotBuilder::earth_from(const Position<J2000>& observer,
+                                             const Rotation<Frame, J2000>& axes,
+                                             const Position<J2000>& sun, Epoch now) const noexcept {
+  EarthDisc<Frame> disc;
+  disc.to_centre = axes * direction_of<J2000>(-observer.m);
+  disc.to_sun = axes * direction_of<J2000>(sun.m);
+  disc.north = axes * Direction<J2000>{Eigen::Vector3d::UnitZ()};  // of J2000: .1 deg of latitude
+  disc.distance_radii = observer.m.norm() / kEarthRadius_m;
+  disc.sun_irradiance_w_m2 = sun_irradiance_w_m2(spec_.sun, sun.m.norm());
+  disc.albedo =
+      spec_.earth.albedo_by_latitude ? zonal_albedo(now) : ZonalAlbedo{{spec_.earth.albedo, 0, 0}};
+  return disc;
+}
+
+void SnapshotBuilder::light_by_earth(const SightLine& line, const Position<J2000>& sun,
+                                     const Rotation<BodyFrame, J2000>& axes,
+                                     Snapshot& out) const noexcept {
+  const EarthshineModel wanted = spec_.earth.earthshine;
+  if (wanted == EarthshineModel::kPaperLamp) {
+    out.earthshine_rung = choose_earthshine(wanted, {}, spec_.earthshine_sensor);
+    const double irradiance =
+        sun_irradiance_w_m2(spec_.sun, (sun.m - line.target.position.m).norm());
+    out.earthshine =
+        lamp_of(paper_earth_lamp(line.target.position, spec_.earth.albedo, irradiance), axes);
+    return;
   }
+  const EarthLight light(earth_from(line.target.position, axes, sun, line.emitted));
+  out.earthshine_rung = choose_earthshine(wanted, light, spec_.earthshine_sensor);
+  const EarthshineModel rung = out.earthshine_rung.model;
+  if (rung == EarthshineModel::kNone) return;
+  const Eigen::Vector3d& irradiance_w_m2 = light.vector_irradiance_w_m2();
+  if (!light.dark())
+    out.earthshine = {direction_of<BodyFrame>(irradiance_w_m2), irradiance_w_m2.norm()};
+  if (rung != EarthshineModel::kVector) out.earth = light;
 }
 
 Snapshot SnapshotBuilder::build(const Shot& shot) const noexcept {
   const SimTime middle = shot.shutter_open + shot.exposure / 2;
   const SightLine line =
       sight_line(camera_, target_, spec_.epoch + middle.time_since_epoch(), spec_.light_path);
+  const Position<J2000> sun = sun_position(spec_.sun.model, line.emitted);
   const Rotation<BodyFrame, J2000> axes = body_axes(line.target);
 
   Snapshot out;
@@ -79,8 +106,14 @@ Snapshot SnapshotBuilder::build(const Shot& shot) const noexcept {
         line.camera.velocity.m_s + earth_velocity(spec_.epoch + middle.time_since_epoch()).m_s;
   out.background_w_m2_sr = spec_.sky_w_m2_sr;
   out.earth_behind = earth_is_behind(line.camera.position, line.target.position);
+  if (spec_.earth.in_frame) {
+    const Rotation<CameraFrame, J2000> camera_axes =
+        shot.attitude.middle.axes * without_aberration(line).inverse();
+    out.earth_in_frame.disc = earth_from(line.camera.position, camera_axes, sun, line.emitted);
+    out.earth_in_frame.air = spec_.earth.air;
+  }
   out.roll_is_fallback = shot.attitude.middle.roll_is_fallback;
-  light_up(line, out);
+  light_up(line, sun, out);
   return out;
 }
 

@@ -16,6 +16,7 @@ struct SceneSpec {
   LightPath light_path = LightPath::kApparent;
   SunSpec sun;
   EarthSpec earth;
+  EarthshineSensor earthshine_sensor;  ///< for EarthshineModel::kAuto
   EulerOffsets target_offsets;
   double sky_w_m2_sr = 0;  ///< zodiacal light and what else is even over the field
   CameraGeometry camera;
@@ -34,7 +35,14 @@ class SnapshotBuilder {
   /// Where the target's centre falls for an attitude at a time.
   [[nodiscard]] PixelPoint target_image(SimTime t, const CameraAttitude& attitude) const noexcept;
   [[nodiscard]] Rotation<BodyFrame, J2000> body_axes(const OrbitState& target) const noexcept;
-  void light_up(const SightLine& line, Snapshot& out) const noexcept;
+  void light_up(const SightLine& line, const Position<J2000>& sun, Snapshot& out) const noexcept;
+  /// What an observer sees whose axes are given; `Frame` is any.
+  template <class Frame>
+  [[nodiscard]] EarthDisc<Frame> earth_from(const Position<J2000>& observer,
+                                            const Rotation<Frame, J2000>& axes,
+                                            const Position<J2000>& sun, Epoch now) const noexcept;
+  void light_by_earth(const SightLine& line, const Position<J2000>& sun,
+                      const Rotation<BodyFrame, J2000>& axes, Snapshot& out) const noexcept;
 
   SceneSpec spec_;
   const Propagator& camera_;

@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "engine/core/constants.h"
 #include "engine/render/render_spec.h"
 #include "engine/render/traced_target.h"
 #include "engine/scene/telescope.h"
@@ -24,13 +25,15 @@ constexpr int kSide_px = 256;
 class Rig {
  public:
   explicit Rig(int threads, const Mesh& mesh = telescope_mesh(),
-               const std::vector<Material>& materials = test_support::telescope_materials())
+               const std::vector<Material>& materials = test_support::telescope_materials(),
+               bool earth_in_frame = false)
       : pool_(threads) {
     SceneSpec scene;
     scene.epoch = flyby.epoch;
     scene.seed = 5;
     scene.sky_w_m2_sr = 5e-7;
     scene.camera = test_support::small_camera(kSide_px);
+    scene.earth.in_frame = earth_in_frame;
     OpticsSpec optics_spec;
     optics_spec.camera = scene.camera;
     const DetectorSpec detector;
@@ -235,6 +238,68 @@ TEST(ImagingChain, HalfOfABallOnTheEdgeOfTheFrameIsVisible) {
   EXPECT_NEAR(half.visible_fraction, 0.5, 3e-3);
 }
 
+TEST(ImagingChain, TheEarthBehindBringsItsLightAndItsShotNoise) {
+  Rig rig(1, telescope_mesh(), test_support::telescope_materials(), true);
+  DnImage out;
+  rig.expose(rig.shot(kClosestOfPass3_s, 5000.0), out);  // no target
+  // The Earth as the snapshot has it, pixel by pixel.
+  SceneSpec scene;
+  scene.epoch = rig.flyby.epoch;
+  scene.camera = test_support::small_camera(kSide_px);
+  const Snapshot s = SnapshotBuilder(scene, rig.flyby.camera, rig.flyby.target)
+                         .build(rig.shot(kClosestOfPass3_s, 5000.0));
+  EarthBackground background;
+  background.reserve(scene.camera, 0);
+  background.draw(s.earth_in_frame, 0.0);
+  WorkerPool pool(1);
+  OpticsSpec optics_spec;
+  optics_spec.camera = scene.camera;
+  const DetectorSpec detector;
+  const double e_per_radiance = Optics(optics_spec, 1.0, pool).throughput_sr() *
+                                detector.electrons_per_irradiance(std::chrono::milliseconds(1));
+  double squares = 0;
+  double sum = 0;
+  for (int v = 0; v < kSide_px; ++v) {
+    for (int u = 0; u < kSide_px; ++u) {
+      const double mean_e = background.at({1.0 * u, 1.0 * v}) * e_per_radiance;
+      EXPECT_GT(mean_e, 500.0);
+      // The quantiser rounds down: half a DN.
+      const double off_e = (out.at(u, v) + 0.5) * detector.gain_e_dn() - mean_e;
+      sum += off_e / detector.noise_e(mean_e);
+      squares += std::pow(off_e / detector.noise_e(mean_e), 2);
+    }
+  }
+  const double pixels = 1.0 * kSide_px * kSide_px;
+  EXPECT_NEAR(sum / pixels, 0.0, 5.0 / std::sqrt(pixels));
+  EXPECT_NEAR(squares / pixels, 1.0, 5.0 * std::sqrt(2.0 / pixels));
+}
+
+TEST(ImagingChain, ADarkBallBeforeTheEarthIsAHoleOfItsOwnSize) {
+  const Mesh ball = test_support::sphere(4.0F, 24, 48, "black");
+  const std::vector<Material> black = {test_support::lambert_material("black", 0.03)};
+  Rig space(1, ball, black, false);
+  Rig earth(1, ball, black, true);
+  DnImage out;
+  const Shot shot = earth.shot(kClosestOfPass3_s);
+  const FrameTruth alone = space.expose(shot, out).truth;
+  const FrameTruth truth = earth.expose(shot, out).truth;
+  // 4 m at 69 km are 40.2 px; the mask goes as far as what is missing is above the noise, some
+  // pixels further. A mesh of 24 rings is up to 1 % smaller.
+  const double across_px = 8.0 / alone.range_m / CameraGeometry{}.ifov_rad();
+  EXPECT_NEAR(truth.box.width(), across_px, 8.0);
+  EXPECT_GE(truth.mask_px, 0.9 * kPi / 4.0 * across_px * across_px);
+  EXPECT_LE(truth.mask_px, 1.3 * kPi / 4.0 * across_px * across_px);
+  EXPECT_LT(out.at(kSide_px / 2 + 30, kSide_px / 2) + 20, out.at(10, 10));
+  EXPECT_GT(truth.signal_to_noise, 100.0);
+  // Its own light is where it was. Blurred, up to a hundredth of it leaves the window, more on the
+  // side that is nearer: the window's middle draws what is left.
+  const PixelPoint off{alone.photocentre_px.u - kSide_px / 2.0,
+                       alone.photocentre_px.v - kSide_px / 2.0};
+  EXPECT_GT(std::hypot(off.u, off.v), 10.0);
+  EXPECT_NEAR(truth.photocentre_px.u, alone.photocentre_px.u, 0.01 * std::abs(off.u));
+  EXPECT_NEAR(truth.photocentre_px.v, alone.photocentre_px.v, 0.01 * std::abs(off.v));
+}
+
 /// The same radiance wherever light can come from, or a square of it in the middle.
 class Patch final : public Renderer {
  public:
@@ -268,6 +333,7 @@ Seen see_patch(double light_e, bool fills_frame, Duration exposure) {
   SceneSpec scene;
   scene.epoch = flyby.epoch;
   scene.camera = test_support::small_camera(64);
+  scene.earth.in_frame = false;
   OpticsSpec optics_spec;
   optics_spec.camera = scene.camera;
   const DetectorSpec detector;

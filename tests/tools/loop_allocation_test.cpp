@@ -32,6 +32,8 @@ starloop::Scenario small_scenario() {
                        "guidance.error_growth_x_urad_s=1",
                        "guidance.target_error_along_m=1",
                        "actuator.delay_ms=9",
+                       "earth.earthshine=auto",
+                       "earth.in_frame=auto",
                        "jitter.lines.wheel.frequency_hz=40",
                        "jitter.lines.wheel.amplitude_urad=1",
                        "sensors.star_tracker_across_arcsec=1",

@@ -40,12 +40,66 @@ void bench_passes_of_15_days(benchmark::State& state) {
 }
 BENCHMARK(bench_passes_of_15_days)->Unit(benchmark::kMillisecond);
 
-void bench_earthshine(benchmark::State& state) {
-  const Position<J2000> target{{0.0, 0.0, 6.8e6}};
-  const auto to_sun = direction_of<J2000>({1.0, 0.0, 0.2});
-  for (auto _ : state) benchmark::DoNotOptimize(earthshine_vector(target, to_sun, 0.3, 1.0));
+/// 420 km up, the Sun 10 deg above the horizon there.
+EarthDisc<BodyFrame> earth_of_bench() {
+  EarthDisc<BodyFrame> disc;
+  disc.to_sun = direction_of<BodyFrame>({1.0, 0.0, -0.18});
+  disc.distance_radii = 1.066;
+  disc.sun_irradiance_w_m2 = 1.0;
+  return disc;
 }
-BENCHMARK(bench_earthshine);
+
+void bench_earth_light(benchmark::State& state) {
+  const EarthDisc<BodyFrame> disc = earth_of_bench();
+  for (auto _ : state) benchmark::DoNotOptimize(EarthLight(disc));
+}
+BENCHMARK(bench_earth_light);
+
+void bench_earth_light_sample(benchmark::State& state) {
+  const EarthLight light(earth_of_bench());
+  double u = 0;
+  for (auto _ : state) {
+    u += 0.618033988749895;
+    u -= u >= 1.0 ? 1.0 : 0.0;
+    benchmark::DoNotOptimize(light.sample(u, 1.0 - u));
+  }
+}
+BENCHMARK(bench_earth_light_sample);
+
+void bench_earth_light_radiance(benchmark::State& state) {
+  const EarthLight light(earth_of_bench());
+  Eigen::Vector3d direction(0.3, 0.2, 0.93);
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(direction);
+    benchmark::DoNotOptimize(light.radiance_w_m2_sr(direction));
+  }
+}
+BENCHMARK(bench_earth_light_radiance);
+
+/// Drawing the Earth and adding it to 1024 x 1024 px: none in view, all of the frame, its limb.
+void bench_earth_background(benchmark::State& state) {
+  CameraGeometry camera;
+  EarthBackground background;
+  background.reserve(camera, 64);
+  EarthInFrame earth;
+  earth.disc.distance_radii = 1.08;
+  const double limb = std::asin(1.0 / earth.disc.distance_radii);
+  const double off = state.range(0) == 0 ? limb + 0.5 : state.range(0) == 1 ? limb - 0.2 : limb;
+  earth.disc.to_centre.unit = {0.0, std::sin(off), std::cos(off)};
+  earth.disc.to_sun = direction_of<CameraFrame>({1.0, -0.3, -0.3});
+  earth.disc.sun_irradiance_w_m2 = 633.0;
+  IrradianceImage image(1024, 1024);
+  for (auto _ : state) {
+    background.draw(earth, 5e-7);
+    if (!background.empty())
+      for (int v = 0; v < 1024; ++v) background.add_row(v, 0, 1.0F, image.row(v));
+    benchmark::ClobberMemory();
+  }
+}
+BENCHMARK(bench_earth_background)
+    ->ArgName("none_full_limb")
+    ->DenseRange(0, 2, 1)
+    ->Unit(benchmark::kMicrosecond);
 
 void bench_brdf_eval(benchmark::State& state) {
   const Brdf brdf({}, state.range(0) == 0 ? Brdf::Variant::kPhysical : Brdf::Variant::kPaper);

@@ -30,7 +30,7 @@ std::vector<engine::FitsCard> header_of(const Scenario& s, const RenderOptions& 
       {"PHASE", t.phase_angle_rad / engine::kDegree, "[deg] Sun, target, camera"},
       {"SUNIRR", t.sun_irradiance_w_m2, "[W/m2] 450-850 nm, at the target"},
       {"EARTHIRR", t.earthshine_w_m2, "[W/m2] vector irradiance of the Earth"},
-      {"EARTHBG", static_cast<long long>(t.earth_behind), "1: the Earth is behind (not drawn)"},
+      {"EARTHBG", static_cast<long long>(t.earth_behind), "1: the Earth is behind the target"},
       {"TARGETU", t.target_px.u, "[px] image of the target's centre, from 0"},
       {"TARGETV", t.target_px.v, "[px] image of the target's centre, from 0"},
       {"SMEAR", t.smear_px, "[px] over the exposure"},
@@ -78,8 +78,6 @@ int render_frame(const CommonOptions& options, const RenderOptions& render) {
           stars.brightest_px.v, stars.brightest_e, stars.behind_earth, stars.faint,
           stars.left_out_e, stars.left_out_peak_e);
     }
-    if (t.earth_behind)
-      std::printf("The Earth is behind the target here; its light is not drawn yet.\n");
   }
   return kGood;
 }

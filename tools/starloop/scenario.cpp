@@ -129,6 +129,24 @@ std::string text_of(const engine::StarCatalogue& stars, const engine::CameraGeom
   return text;
 }
 
+/// By its parameters a surface is diffuse with an albedo of pi kd; the energy it has left may
+/// shine.
+engine::EarthshineSensor earthshine_sensor(const engine::SensorNoise& noise,
+                                           const std::vector<engine::Material>& materials) {
+  engine::EarthshineSensor sensor;
+  sensor.e_per_radiance = noise.e_per_radiance;
+  sensor.dark_variance_e2 = noise.dark_variance_e2;
+  sensor.unseen_sigmas = kUnseenShareOfNoise;
+  sensor.diffuse_albedo = 0;
+  sensor.glossy_albedo = 0;
+  for (const engine::Material& m : materials) {
+    const double diffuse = std::min(1.0, engine::kPi * m.parameters.kd);
+    sensor.diffuse_albedo = std::max(sensor.diffuse_albedo, diffuse);
+    if (m.parameters.kb > 0.0) sensor.glossy_albedo = std::max(sensor.glossy_albedo, 1 - diffuse);
+  }
+  return sensor;
+}
+
 int worker_threads(int wanted) {
   if (wanted > 0) return wanted;
   return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
@@ -241,6 +259,8 @@ Rig::Rig(const Scenario& scenario, int threads)
   render.noise = {optics.throughput_sr() * detector.electrons_per_irradiance(scenario.run.exposure),
                   noise_e * noise_e, detector.full_well_e, optics.noise_blur_px()};
   render.clock = &hil::SteadyClock::stopwatch;
+  engine::SceneSpec scene = scenario.scene;
+  scene.earthshine_sensor = earthshine_sensor(render.noise, scenario.materials);
   engine::Mesh mesh = load_mesh(scenario);
   triangles_ = mesh.triangles.size();
   std::shared_ptr<engine::TracedTarget> target;
@@ -260,7 +280,7 @@ Rig::Rig(const Scenario& scenario, int threads)
         engine::PointSplat(scenario.optics, faint_w_m2, pool_), detector);
   }
   generator_ = std::make_unique<engine::ImagingChain>(
-      engine::SnapshotBuilder(scenario.scene, camera_, target_),
+      engine::SnapshotBuilder(scene, camera_, target_),
       engine::make_renderer(render, std::move(target), pool_), std::move(optics),
       engine::Detector(detector, pool_), detector, scenario.scene.camera,
       &hil::SteadyClock::stopwatch, std::move(stars));

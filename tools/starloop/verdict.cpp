@@ -132,8 +132,9 @@ void write_report(const std::filesystem::path& folder, const Scenario& s, const 
       {"statistics", statistics_json(log)},
       {"detection", detection_json(v.detection)},
       {"left_out",
-       {"the Earth and stars behind the target", "defocus", "the Sun's disc",
-        "PRNU, DSNU and defects"}},
+       {s.scene.earth.in_frame ? "stars behind the target"
+                               : "the Earth and stars behind the target",
+        "defocus", "the Sun's disc", "PRNU, DSNU and defects"}},
       {"criteria_met", open_loop ? nlohmann::json(nullptr) : nlohmann::json(v.good)}};
   std::ofstream(folder / "report.json") << report.dump(2) << "\n";
 }

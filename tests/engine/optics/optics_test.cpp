@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -12,6 +13,7 @@
 namespace engine {
 namespace {
 
+using Eigen::Vector3d;
 using test_support::small_camera;
 
 constexpr int kSide_px = 512;
@@ -329,6 +331,75 @@ TEST(Optics, EvenRadianceIsTheThroughput) {
   ASSERT_EQ(out.height(), kSide_px);
   const auto want = static_cast<float>(3.25 * optics.throughput_sr());
   EXPECT_TRUE(std::ranges::all_of(out.pixels(), [want](float x) { return x == want; }));
+}
+
+/// Before the sunlit Earth that fills the field, a target that covers a part of each cell of a
+/// square and sends `share` of the light that it hides.
+Radiance before_the_earth(const Optics& optics, double share) {
+  EarthInFrame earth;
+  earth.disc.to_centre.unit = Vector3d(0.0, 0.6, 0.8);
+  earth.disc.to_sun.unit = Vector3d(0.6, 0.0, -0.8);
+  earth.disc.distance_radii = 1.1;
+  earth.disc.sun_irradiance_w_m2 = 600.0;
+  Radiance in;
+  in.uniform_w_m2_sr = 0.5;
+  in.earth.reserve(spec_of().camera, optics.wish().beyond_frame_px);
+  in.earth.draw(earth, in.uniform_w_m2_sr);
+  in.region = {200, 180, 260, 220};
+  in.grid.resize(3 * in.region.width(), 3 * in.region.height());
+  in.cover.resize(3 * in.region.width(), 3 * in.region.height());
+  for (int j = 0; j < in.grid.height(); ++j) {
+    for (int i = 0; i < in.grid.width(); ++i) {
+      in.cover.at(i, j) = 0.5F + 0.5F * std::sin(0.7F * static_cast<float>(i * (j + 1)));
+      const PixelPoint place{1.0 * in.region.left + i / 3, 1.0 * in.region.top + j / 3};
+      in.grid.at(i, j) = static_cast<float>(share * static_cast<double>(in.cover.at(i, j)) *
+                                            (in.uniform_w_m2_sr + in.earth.at(place)));
+    }
+  }
+  return in;
+}
+
+TEST(Optics, ATargetAsBrightAsTheEarthThatItHidesIsNotSeen) {
+  WorkerPool pool(1);
+  Optics optics(spec_of(), kFaint_w_m2, pool);
+  const Radiance in = before_the_earth(optics, 1.0);
+  ASSERT_FALSE(in.earth.empty());
+  IrradianceImage out;
+  EXPECT_FALSE(optics.project(in, out).window.empty());
+  for (int v = 0; v < kSide_px; v += 7) {
+    for (int u = 0; u < kSide_px; u += 7) {
+      const double want =
+          optics.throughput_sr() * (in.uniform_w_m2_sr + in.earth.at({1.0 * u, 1.0 * v}));
+      // Interpolated nodes, and single precision.
+      EXPECT_NEAR(out.at(u, v), want, 1e-3 * want);
+    }
+  }
+}
+
+TEST(Optics, ABlackTargetTakesAwayWhatItHides) {
+  WorkerPool pool(1);
+  Optics optics(spec_of(), kFaint_w_m2, pool);
+  const Radiance in = before_the_earth(optics, 0.0);
+  IrradianceImage out;
+  const OpticsReport report = optics.project(in, out);
+  double missing = 0;
+  for (int v = report.window.top; v < report.window.bottom; ++v) {
+    const auto throughput = static_cast<float>(optics.throughput_sr());
+    std::vector<float> behind(kSide_px, throughput * static_cast<float>(in.uniform_w_m2_sr));
+    in.earth.add_row(v, 0, throughput, behind);
+    for (int u = report.window.left; u < report.window.right; ++u)
+      missing += static_cast<double>(behind[static_cast<std::size_t>(u)]) -
+                 static_cast<double>(out.at(u, v));
+  }
+  double hidden = 0;
+  for (int j = 0; j < in.cover.height(); ++j)
+    for (int i = 0; i < in.cover.width(); ++i)
+      hidden += static_cast<double>(in.cover.at(i, j)) / 9.0 * optics.throughput_sr() *
+                (in.uniform_w_m2_sr +
+                 in.earth.at({1.0 * in.region.left + i / 3, 1.0 * in.region.top + j / 3}));
+  EXPECT_GT(hidden, 0.0);
+  // The wings that nobody follows, and rounding: 2^-24 of each pixel's light where 1200 are hidden.
+  EXPECT_NEAR(missing / hidden, 1.0, report.lost_flux_share + 512.0 * 512.0 / 1200.0 * 0x1p-24);
 }
 
 TEST(Optics, AveragesNoiseOverTheSquaredSpreadOfAPoint) {

@@ -1,17 +1,17 @@
 #include "engine/scene/earth.h"
 
 #include <cmath>
+#include <vector>
 
 #include <gtest/gtest.h>
 
 #include "engine/core/constants.h"
-#include "tests/support/csv.h"
+#include "engine/orbit/utc.h"
 
 namespace engine {
 namespace {
 
 using Eigen::Vector3d;
-using test_support::Csv;
 
 constexpr double kPaperSun_w_m2 = 634.64;
 constexpr double kAlbedo = 0.3;
@@ -21,23 +21,16 @@ Direction<J2000> sun_at(double zenith_deg) {
   return {{std::sin(zenith_deg * kDegree), 0.0, std::cos(zenith_deg * kDegree)}};
 }
 
-TEST(Earthshine, AgreesWithTheReferenceIntegral) {
-  const Csv reference("earthshine_alt420.csv");
-  for (const Csv::Row& row : reference.rows()) {
-    const double zenith_deg = row.number("solar_zenith_at_subtarget_deg");
-    const Vector3d light = earthshine_vector(kAt420km, sun_at(zenith_deg), kAlbedo, kPaperSun_w_m2);
-    const double want = row.number("vector_irradiance_W_m2");
-    // The model's .2 %; six decimals are printed.
-    EXPECT_NEAR(light.norm(), want, 0.002 * want + 1e-6) << zenith_deg;
-    const double want_nadir = row.number("E_nadir_facet_W_m2");
-    EXPECT_NEAR(-light.z(), want_nadir, 0.002 * want + 1e-6) << zenith_deg;
-    EXPECT_NEAR(light.y(), 0.0, 1e-12 * kPaperSun_w_m2);
-    if (want > 0.0) {
-      // A light that is wrong by .2 % of its length turns by .11 deg at most.
-      const double angle_deg = std::atan2(light.x(), -light.z()) / kDegree;
-      EXPECT_NEAR(angle_deg, row.number("vector_angle_from_nadir_toward_sun_deg"), 0.12);
-    }
-  }
+/// The nadir along -z.
+Vector3d earthshine_vector(const Position<J2000>& target, const Direction<J2000>& to_sun,
+                           double albedo, double sun_irradiance) {
+  EarthDisc<BodyFrame> disc;
+  disc.to_centre.unit = -target.m.normalized();
+  disc.to_sun.unit = to_sun.unit;
+  disc.distance_radii = target.m.norm() / kEarthRadius_m;
+  disc.sun_irradiance_w_m2 = sun_irradiance;
+  disc.albedo = {{albedo, 0.0, 0.0}};
+  return EarthLight(disc).vector_irradiance_w_m2();
 }
 
 TEST(Earthshine, FallsWithTheSunAsTheStabilityTableSays) {
@@ -53,11 +46,6 @@ TEST(Earthshine, FallsWithTheSunAsTheStabilityTableSays) {
     const Vector3d light = earthshine_vector(kAt420km, sun_at(s.zenith_deg), kAlbedo, 1.0);
     EXPECT_NEAR(-light.z(), s.of_sun, s.tolerance) << s.zenith_deg;
   }
-}
-
-TEST(Earthshine, IsZeroAtNight) {
-  for (const double zenith_deg : {110.0, 150.0, 180.0})
-    EXPECT_EQ(earthshine_vector(kAt420km, sun_at(zenith_deg), kAlbedo, kPaperSun_w_m2).norm(), 0.0);
 }
 
 TEST(Earthshine, FromFarAwayIsALambertSpheresPhaseFunction) {
@@ -92,13 +80,84 @@ TEST(Earthshine, GrowsWithAlbedoAndSun) {
   EXPECT_EQ(earthshine_vector(kAt420km, sun_at(50.0), 0.0, 100.0).norm(), 0.0);
 }
 
-TEST(Earthshine, IsFiniteOnTheGround) {
-  for (const double height_m : {-1.0, 0.0, 1e-3, 1.0}) {
-    const Position<J2000> low{{0.0, 0.0, kEarthRadius_m + height_m}};
-    const Vector3d light = earthshine_vector(low, sun_at(0.0), kAlbedo, 1.0);
-    EXPECT_TRUE(light.allFinite()) << height_m;
-    EXPECT_LE(light.norm(), kAlbedo * 1.001) << height_m;
+EarthLight light_at(double zenith_deg) {
+  EarthDisc<BodyFrame> disc;
+  disc.to_sun.unit = {std::sin(zenith_deg * kDegree), 0.0, -std::cos(zenith_deg * kDegree)};
+  disc.distance_radii = kAt420km.m.norm() / kEarthRadius_m;
+  disc.sun_irradiance_w_m2 = 1.0;
+  return EarthLight(disc);
+}
+
+TEST(EarthshineChoice, RisesFromNoneToTheCapWithTheExposureAndSaysWhatItAccepts) {
+  const EarthLight light = light_at(60.0);
+  EarthshineSensor sensor;
+  sensor.dark_variance_e2 = 22.0;
+  sensor.diffuse_albedo = 0.5;
+  sensor.glossy_albedo = 0.0;
+  std::vector<EarthshineModel> seen;
+  for (double e = 1e-3; e < 1e9; e *= 1.5) {
+    sensor.e_per_radiance = e;
+    const EarthshineChoice choice = choose_earthshine(EarthshineModel::kAuto, light, sensor);
+    if (seen.empty() || seen.back() != choice.model) seen.push_back(choice.model);
+    // A diffuse surface: what it gets with the rung instead of the cap, over its noise with it.
+    const double all_e = e * 0.5 / kPi * light.scalar_irradiance_w_m2();
+    const double lost_e = choice.model == EarthshineModel::kNone
+                              ? e * 0.5 / kPi * light.vector_irradiance_w_m2().norm()
+                          : choice.model == EarthshineModel::kHarmonics ? all_e * 3.0 / 32.0
+                                                                        : 0.0;
+    EXPECT_LE(lost_e, choice.error_e * (1.0 + 1e-12));
+    EXPECT_LE(choice.error_e, 0.3 * std::sqrt(22.0 + all_e));
   }
+  EXPECT_EQ(seen, (std::vector{EarthshineModel::kNone, EarthshineModel::kHarmonics,
+                               EarthshineModel::kCap}));
+}
+
+TEST(EarthshineChoice, HarmonicsAnswerForWhatTheyLeaveOfAMirrorsLight) {
+  EarthshineSensor sensor;
+  sensor.dark_variance_e2 = 22.0;
+  const EarthLight light = light_at(60.0);
+  int left_out = 0;
+  for (double e = 1e-3; e < 1e6; e *= 1.1) {
+    sensor.e_per_radiance = e;
+    const EarthshineChoice choice = choose_earthshine(EarthshineModel::kAuto, light, sensor);
+    if (choice.model == EarthshineModel::kCap) continue;
+    ++left_out;
+    EXPECT_GE(choice.error_e, e * light.largest_radiance_w_m2_sr());
+  }
+  EXPECT_GT(left_out, 10);
+}
+
+TEST(EarthshineChoice, WithoutASensorItIsTheCapAndAtNightNothing) {
+  EXPECT_EQ(choose_earthshine(EarthshineModel::kAuto, light_at(60.0), {}).model,
+            EarthshineModel::kCap);
+  const EarthshineChoice night = choose_earthshine(EarthshineModel::kAuto, light_at(140.0), {});
+  EXPECT_EQ(night.model, EarthshineModel::kNone);
+  EXPECT_EQ(night.error_e, 0.0);
+}
+
+TEST(EarthshineChoice, WhatIsAskedForIsKeptAndItsErrorSaid) {
+  EarthshineSensor sensor;
+  sensor.e_per_radiance = 267.0;
+  const EarthLight light = light_at(60.0);
+  for (const EarthshineModel model : {EarthshineModel::kNone, EarthshineModel::kVector,
+                                      EarthshineModel::kHarmonics, EarthshineModel::kCap}) {
+    const EarthshineChoice choice = choose_earthshine(model, light, sensor);
+    EXPECT_EQ(choice.model, model);
+    EXPECT_EQ(choice.error_e > 0.0, model != EarthshineModel::kCap);
+  }
+  EXPECT_TRUE(std::isnan(choose_earthshine(EarthshineModel::kPaperLamp, {}, sensor).error_e));
+}
+
+TEST(ZonalAlbedoOfDate, IsThatOfKnockeAndOthers) {
+  // ECSS-E-ST-10-04C, annex F: .34, .10 cos(2 pi (t - 1981-12-22) / 365.25 d), .29.
+  const ZonalAlbedo winter = zonal_albedo(epoch_from_utc("1981-12-22T00:00:00").value());
+  EXPECT_NEAR(winter.at(0.0), 0.34 - 0.145, 1e-6);
+  EXPECT_NEAR(winter.at(1.0), 0.34 + 0.10 + 0.29, 1e-6);
+  EXPECT_NEAR(winter.at(-1.0), 0.34 - 0.10 + 0.29, 1e-6);
+  // Half a year later the hemispheres have changed places; a day is 1e-4 of a cosine's top.
+  const ZonalAlbedo summer = zonal_albedo(epoch_from_utc("2022-06-22T12:00:00").value());
+  EXPECT_NEAR(summer.at(1.0), winter.at(-1.0), 1e-4);
+  EXPECT_NEAR(summer.at(-0.5), winter.at(0.5), 1e-4);
 }
 
 TEST(PaperEarthLamp, ShinesFromTheNadirWhateverTheSunDoes) {
@@ -115,7 +174,18 @@ TEST(ReadEarth, KnowsItsModels) {
   EXPECT_EQ(read("").earthshine, EarthshineModel::kVector);
   EXPECT_EQ(read("earthshine = \"none\"").earthshine, EarthshineModel::kNone);
   EXPECT_EQ(read("earthshine = \"paper-lamp\"").earthshine, EarthshineModel::kPaperLamp);
+  for (const EarthshineModel model : {EarthshineModel::kVector, EarthshineModel::kHarmonics,
+                                      EarthshineModel::kCap, EarthshineModel::kAuto})
+    EXPECT_EQ(read("earthshine = \"" + std::string(name_of(model)) + "\"").earthshine, model);
+  EXPECT_FALSE(read("albedo = 0.2").albedo_by_latitude);
+  EXPECT_TRUE(read("albedo = \"map\"").albedo_by_latitude);
+  EXPECT_TRUE(read("").in_frame);
+  EXPECT_FALSE(read("in_frame = \"no\"").in_frame);
+  EXPECT_EQ(read("air_optical_depth = 0.0").air.optical_depth, 0.0);
   EXPECT_THROW(read("earthshine = \"some\""), ConfigError);
+  EXPECT_THROW(read("albedo = \"some\""), ConfigError);
+  EXPECT_THROW(read("in_frame = \"yes\""), ConfigError);
+  EXPECT_THROW(read("air_optical_depth = -1.0"), ConfigError);
   EXPECT_THROW(read("albedo = 1.1"), ConfigError);
 }
 

@@ -203,6 +203,100 @@ TEST(SnapshotBuilder, KnowsTheEarthBehindTheTarget) {
   EXPECT_FALSE(builder.build(tracked_shot(flyby, 309795.0)).earth_behind);
 }
 
+TEST(SnapshotBuilder, TheEarthIsInTheTargetsPixelExactlyInTheIntervalsOfTheReference) {
+  const Flyby flyby;
+  SceneSpec spec = spec_of(flyby, LightPath::kGeometric);
+  spec.earth.air.optical_depth = 0.0;
+  const SnapshotBuilder builder(spec, flyby.camera, flyby.target);
+  EarthBackground background;
+  background.reserve(spec.camera, 0);
+  int sunlit = 0;
+  const Csv intervals("background_intervals.csv");
+  for (const Csv::Row& row : intervals.rows()) {
+    const bool earth = row.text("background") == "earth_background";
+    const double start_s = row.number("start_s");
+    const double end_s = row.number("end_s");
+    // The ends to a millisecond: a target's pixel is 6 m of the ground 2700 km away.
+    for (const double t_s : {start_s + 1e-3, 0.5 * (start_s + end_s), end_s - 1e-3}) {
+      const Snapshot s = builder.build(tracked_shot(flyby, t_s, LightPath::kGeometric));
+      EXPECT_EQ(s.earth_behind, earth) << t_s;
+      background.draw(s.earth_in_frame, 0.0);
+      const double light = background.at(s.target_px);
+      if (!earth) {
+        EXPECT_EQ(light, 0.0) << t_s;
+        continue;
+      }
+      const EarthDisc<CameraFrame>& disc = s.earth_in_frame.disc;
+      const Vector3d unit = spec.camera.direction_at(s.target_px).normalized();
+      const double passes_at = disc.passes_at_radii(unit);
+      ASSERT_LT(passes_at, 1.0) << t_s;
+      const double cos_sun = disc.vertical_at(unit, passes_at).dot(disc.to_sun.unit);
+      // At night it is dark; the Sun's disc is .27 deg wide.
+      if (cos_sun > 0.005) {
+        EXPECT_NEAR(light, 0.3 * disc.sun_irradiance_w_m2 / kPi * cos_sun, 1e-9) << t_s;
+        ++sunlit;
+      } else if (cos_sun < -0.005) {
+        EXPECT_EQ(light, 0.0) << t_s;
+      }
+    }
+  }
+  EXPECT_GT(sunlit, 10);
+}
+
+TEST(SnapshotBuilder, TheEarthInTheFrameMayBeLeftOut) {
+  const Flyby flyby;
+  SceneSpec spec = spec_of(flyby);
+  const Shot shot = tracked_shot(flyby, 309780.0);
+  EXPECT_TRUE(
+      SnapshotBuilder(spec, flyby.camera, flyby.target).build(shot).earth_in_frame.disc.seen());
+  spec.earth.in_frame = false;
+  EXPECT_FALSE(
+      SnapshotBuilder(spec, flyby.camera, flyby.target).build(shot).earth_in_frame.disc.seen());
+}
+
+TEST(SnapshotBuilder, TheEarthLightIsThatOfTheLampInBodyAxes) {
+  const Flyby flyby;
+  SceneSpec spec = spec_of(flyby);
+  spec.target_offsets = {0.1, -0.2, 0.3};
+  for (const double t_s : {0.0, 1200.0, 309781.0}) {
+    const Shot shot = tracked_shot(flyby, t_s);
+    spec.earth.earthshine = EarthshineModel::kVector;
+    const Snapshot lamp = SnapshotBuilder(spec, flyby.camera, flyby.target).build(shot);
+    EXPECT_TRUE(lamp.earth.dark());
+    for (const EarthshineModel model : {EarthshineModel::kHarmonics, EarthshineModel::kCap}) {
+      spec.earth.earthshine = model;
+      const Snapshot s = SnapshotBuilder(spec, flyby.camera, flyby.target).build(shot);
+      EXPECT_EQ(s.earthshine_rung.model, model);
+      EXPECT_EQ(s.earthshine.irradiance_w_m2, lamp.earthshine.irradiance_w_m2);
+      const Vector3d light = s.earthshine.toward.unit * s.earthshine.irradiance_w_m2;
+      EXPECT_LE((s.earth.vector_irradiance_w_m2() - light).norm(), 1e-12 * light.norm());
+      // Below the target is where the body's z points, turned by its offsets.
+      const Vector3d nadir = body_offset(spec.target_offsets).matrix * Vector3d::UnitZ();
+      EXPECT_LT((s.earth.disc().to_centre.unit - nadir).norm(), 1e-12);
+      EXPECT_LT((s.earth.disc().to_sun.unit - s.sun.toward.unit).norm(), 1e-4);
+    }
+  }
+}
+
+TEST(SnapshotBuilder, TheCameraSeesTheEarthWhereItsRaysToTheTargetSayItIs) {
+  // Aberration is taken out of both in one way.
+  const Flyby flyby;
+  SceneSpec spec = spec_of(flyby);
+  spec.earth.earthshine = EarthshineModel::kCap;
+  const SnapshotBuilder builder(spec, flyby.camera, flyby.target);
+  for (const double t_s : {kClosestOfPass3_s - 10.0, kClosestOfPass3_s, kClosestOfPass3_s + 10.0}) {
+    const Snapshot s = builder.build(tracked_shot(flyby, t_s));
+    ASSERT_FALSE(s.earth.dark());
+    const EarthDisc<BodyFrame>& below = s.earth.disc();
+    const Vector3d centre_m = below.distance_radii * kEarthRadius_m * below.to_centre.unit;
+    const Vector3d from_camera = (centre_m - s.camera.m).normalized();
+    const EarthDisc<CameraFrame>& seen = s.earth_in_frame.disc;
+    const Vector3d by_rays = s.body_from_camera.matrix * seen.to_centre.unit;
+    EXPECT_LT((by_rays - from_camera).norm(), 1e-12);  // roundings; a pixel is 1.4e-6
+    EXPECT_NEAR(seen.distance_radii, (centre_m - s.camera.m).norm() / kEarthRadius_m, 1e-12);
+  }
+}
+
 TEST(SnapshotBuilder, PassesTheFallbackOfTheRollOn) {
   const Flyby flyby;
   const SnapshotBuilder builder(spec_of(flyby), flyby.camera, flyby.target);

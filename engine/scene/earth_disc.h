@@ -1,0 +1,73 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "engine/core/constants.h"
+#include "engine/core/vec.h"
+
+namespace engine {
+
+/// The share of sunlight that the Earth sends back, clouds and air included, by latitude: a series
+/// of Legendre polynomials in its sine.
+struct ZonalAlbedo {
+  std::array<double, 3> legendre{0.3, 0.0, 0.0};
+
+  [[nodiscard]] double at(double sin_latitude) const noexcept {
+    const double s = sin_latitude;
+    return legendre[0] + s * legendre[1] + 0.5 * (3.0 * s * s - 1.0) * legendre[2];
+  }
+  /// On the whole Earth. Of a parabola, at an end or where it is flat.
+  [[nodiscard]] double largest() const noexcept {
+    double most = std::max(at(-1.0), at(1.0));
+    const double flat_at = -legendre[1] / (3.0 * legendre[2]);
+    if (std::abs(flat_at) < 1.0) most = std::max(most, at(flat_at));
+    return most;
+  }
+};
+
+/// The Earth as an observer sees it: a Lambert sphere under a distant Sun, without air, its
+/// terminator sharp.
+/// Leaves out flattening, and that clouds and seas send more light forward than back: towards the
+/// limb a real Earth under a low Sun is brighter than this one.
+template <class Frame>
+struct EarthDisc {
+  Direction<Frame> to_centre;
+  Direction<Frame> to_sun;
+  Direction<Frame> north;
+  double distance_radii = 0;  ///< of the observer from the centre; 1 or less: no Earth to be seen
+  double sun_irradiance_w_m2 = 0;
+  ZonalAlbedo albedo;
+
+  [[nodiscard]] bool seen() const noexcept { return distance_radii > 1.0; }
+  /// How far, in radii, the line along the unit vector `direction` passes from the centre; more
+  /// than any number where it leads away from the Earth.
+  [[nodiscard]] double passes_at_radii(const Eigen::Vector3d& direction) const noexcept {
+    if (!(direction.dot(to_centre.unit) > 0.0)) return HUGE_VAL;
+    return distance_radii * direction.cross(to_centre.unit).norm();
+  }
+  /// The vertical where that line meets the ground, or comes closest to it.
+  [[nodiscard]] Eigen::Vector3d vertical_at(const Eigen::Vector3d& direction,
+                                            double passes_at_radii) const noexcept {
+    const double p = passes_at_radii;
+    const double to_foot = distance_radii * direction.dot(to_centre.unit);
+    const double slant = p < 1.0 ? to_foot - std::sqrt(1.0 - p * p) : to_foot;
+    const Eigen::Vector3d place = slant * direction - distance_radii * to_centre.unit;
+    return p < 1.0 ? place : Eigen::Vector3d(place / p);
+  }
+  /// Of ground that the Sun shines on from the zenith.
+  [[nodiscard]] double zenith_radiance_w_m2_sr(const Eigen::Vector3d& vertical) const noexcept {
+    return sun_irradiance_w_m2 / kPi * albedo.at(vertical.dot(north.unit));
+  }
+  /// 0 beyond the limb and on the night side. Pre: `direction` is a unit vector.
+  [[nodiscard]] double radiance_w_m2_sr(const Eigen::Vector3d& direction) const noexcept {
+    const double p = passes_at_radii(direction);
+    if (!seen() || !(p < 1.0)) return 0.0;
+    const Eigen::Vector3d vertical = vertical_at(direction, p);
+    const double cos_sun = vertical.dot(to_sun.unit);
+    return cos_sun > 0.0 ? cos_sun * zenith_radiance_w_m2_sr(vertical) : 0.0;
+  }
+};
+
+}  // namespace engine
