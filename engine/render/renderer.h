@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <string_view>
 #include <vector>
 
@@ -67,10 +68,10 @@ struct Rung {
 };
 
 /// The Monte Carlo error of an image after the optics over the sensor's noise, by the pixels that
-/// see light; those at full well are counted apart.
+/// see light; those at full well are counted apart. Not a number: not known.
 struct NoiseReached {
-  double rms = 0;
-  double worst = 0;
+  double rms = std::numeric_limits<double>::quiet_NaN();
+  double worst = std::numeric_limits<double>::quiet_NaN();
   int lit_px = 0;
   int clipped_px = 0;
 };

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdlib>
 #include <memory>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -19,7 +20,7 @@ namespace {
 using engine::Duration;
 
 /// The paper's pass through a camera of 128 x 128 coarse pixels, the whole telescope in view.
-starloop::Scenario small_scenario() {
+starloop::Scenario small_scenario(const std::string& method) {
   starloop::CommonOptions options;
   options.file = STARLOOP_SOURCE_DIR "/config/flyby.toml";
   options.overrides = {"camera.width_px=128",
@@ -27,6 +28,7 @@ starloop::Scenario small_scenario() {
                        "camera.pixel_pitch_um=13",
                        "optics.aperture_m=0.18",
                        "render.samples_per_pixel=4",
+                       "render.method=" + method,
                        "optics.largest_wing_px=16",
                        "guidance.error_x_urad=5",
                        "guidance.error_growth_x_urad_s=1",
@@ -51,7 +53,8 @@ struct Outcome {
 
 class Bench {
  public:
-  Bench() : scenario_(small_scenario()), rig_(scenario_, 2) {
+  explicit Bench(const std::string& method)
+      : scenario_(small_scenario(method)), rig_(scenario_, 2) {
     pass_ = starloop::passes_of(scenario_)[scenario_.run.pass - 1];
   }
 
@@ -122,7 +125,7 @@ class Bench {
   engine::Pass pass_;
 };
 
-TEST(LoopAllocation, TheCounterCountsEveryWayToTheHeap) {
+TEST(AllocationCounter, CountsEveryWayToTheHeap) {
   if (!no_alloc::armed()) GTEST_SKIP() << "a sanitizer counts instead";
   const auto counted = [](auto&& allocate) {
     const std::uint64_t before = no_alloc::count();
@@ -159,9 +162,11 @@ TEST(LoopAllocation, TheCounterCountsEveryWayToTheHeap) {
   EXPECT_EQ(after - before, 1U);
 }
 
-TEST(LoopAllocation, FiveHundredFramesTakeNoMoreFromTheHeapThanTen) {
+class LoopAllocation : public testing::TestWithParam<const char*> {};
+
+TEST_P(LoopAllocation, FiveHundredFramesTakeNoMoreFromTheHeapThanTen) {
   if (!no_alloc::armed()) GTEST_SKIP() << "a sanitizer counts instead";
-  Bench bench;
+  Bench bench(GetParam());
   const Outcome warm_up = bench.run(10);
   ASSERT_EQ(warm_up.report.sent, 10U);
   const Outcome few = bench.run(10);
@@ -177,5 +182,7 @@ TEST(LoopAllocation, FiveHundredFramesTakeNoMoreFromTheHeapThanTen) {
   }
   EXPECT_EQ(few.allocations, many.allocations);
 }
+
+INSTANTIATE_TEST_SUITE_P(Methods, LoopAllocation, testing::Values("paths", "lattice"));
 
 }  // namespace

@@ -1,5 +1,7 @@
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <string>
 
 #include "engine/core/constants.h"
 #include "engine/core/fits.h"
@@ -10,10 +12,18 @@
 namespace starloop {
 namespace {
 
+std::string left_out(const engine::Rung& rung) {
+  if (!std::isfinite(rung.error_e)) return "";
+  char text[60];
+  std::snprintf(text, sizeof text, "; leaves out %.2f e- of a pixel at most", rung.error_e);
+  return text;
+}
+
 std::vector<engine::FitsCard> header_of(const Scenario& s, const RenderOptions& options,
                                         const engine::FrameReport& r) {
   const engine::Epoch open = s.scene.epoch + engine::from_seconds(options.time_s);
   const engine::FrameTruth& t = r.truth;
+  const engine::NoiseReached& noise = r.render.rho_mc;
   return {
       {"ORIGIN", "Starloop", "program that made this frame"},
       {"OBJECT", s.mesh, "target"},
@@ -36,6 +46,9 @@ std::vector<engine::FitsCard> header_of(const Scenario& s, const RenderOptions& 
       {"SMEAR", t.smear_px, "[px] over the exposure"},
       {"PEAKE", t.peak_e, "[e-] brightest pixel of the target, no noise"},
       {"SAMPLES", static_cast<long long>(r.render.samples_per_pixel), "per pixel"},
+      // FITS has no number that is none.
+      {"RHOMC", std::isfinite(noise.rms) ? noise.rms : -1.0,
+       "rms noise of the rendering over the sensor's; -1: unknown"},
       {"BOUNCES", static_cast<long long>(r.render.bounces), "indirect"},
       {"WINGPX", static_cast<long long>(r.optics.wing_px),
        "[px] how far light's spread is followed"},
@@ -69,6 +82,14 @@ int render_frame(const CommonOptions& options, const RenderOptions& render) {
                 fits.string().c_str(), png.c_str(), t.range_m * 1e-3,
                 t.phase_angle_rad / engine::kDegree, t.peak_e, report.peak_dn,
                 t.sun_irradiance_w_m2 > 0.0 ? "" : ", in the Earth's shadow");
+    const engine::NoiseReached& noise = report.render.rho_mc;
+    if (std::isfinite(noise.rms))
+      std::printf("rendering noise %.3f of the sensor's over %d lit pixels, at worst %.2f\n",
+                  noise.rms, noise.lit_px, noise.worst);
+    for (const engine::Rung& rung : report.render.rungs)
+      if (!rung.ladder.empty())
+        std::printf("%s: %s%s\n", std::string(rung.ladder).c_str(), std::string(rung.taken).c_str(),
+                    left_out(rung).c_str());
     if (!rig.star_text().empty()) {
       const engine::StarReport& stars = report.stars;
       std::printf(

@@ -33,6 +33,15 @@ Json or_null(const std::optional<double>& figure) { return figure ? Json(*figure
 /// A figure that means nothing when nothing was counted.
 Json if_any(std::uint64_t count, double figure) { return count > 0 ? Json(figure) : Json(nullptr); }
 
+/// Of the frames where it is known.
+Json render_noise_of(const RunLog& log) {
+  std::vector<double> sigmas;
+  for (const hil::FrameRecord& r : log.frames)
+    if (r.handed_over && std::isfinite(r.report.render.rho_mc.rms))
+      sigmas.push_back(r.report.render.rho_mc.rms);
+  return json_of(hil::percentiles_of(std::move(sigmas)), "sigma");
+}
+
 /// Of the frames that were handed over: the others were not rendered.
 template <class Time>
 Json times_of(const RunLog& log, const Time& time) {
@@ -73,6 +82,7 @@ Json statistics_json(const RunLog& log) {
           {"geometry", times_of(log, [](const Record& r) { return r.report.times.geometry; })},
           {"render", times_of(log, [](const Record& r) { return r.report.times.render; })},
           {"optics", times_of(log, [](const Record& r) { return r.report.times.optics; })},
+          {"render_noise", render_noise_of(log)},
           {"detector", times_of(log, [](const Record& r) { return r.report.times.detector; })}};
 }
 
