@@ -41,10 +41,6 @@ class BodyLight {
     const std::uint32_t patch = patches_.at(place);
     return patch == SurfacePatches::kNone ? 0.0F : leaving_[patch];
   }
-  /// Of a patch's points, the share that face a lamp and are reached by it.
-  [[nodiscard]] float lit_share(std::size_t lamp, std::uint32_t patch) const noexcept {
-    return lamps_[lamp].lit_share[patch];
-  }
   [[nodiscard]] const SurfacePatches& patches() const noexcept { return patches_; }
 
  private:

@@ -11,7 +11,7 @@ using Eigen::Vector3f;
 
 namespace {
 
-// In each four points of a row one asks for the Sun; over four rows, each column once.
+// In each four points of a row one asks for a lamp; over four rows, each column once.
 constexpr int kAskEvery = 4;
 constexpr std::array<int, kAskEvery> kAsks = {0, 2, 1, 3};
 constexpr bool asks_first(int x, int y) noexcept {
@@ -30,7 +30,7 @@ LatticeRenderer::LatticeRenderer(const RenderSpec& spec, std::shared_ptr<TracedT
     : spec_(spec),
       target_(std::move(target)),
       view_(spec, target_),
-      sun_view_(target_->mesh),
+      lamp_views_{LampView(target_->mesh), LampView(target_->mesh)},
       body_light_(*target_, spec.bounces, pool),
       bounced_paths_(*target_, spec.bounces),
       bounced_(*target_, body_light_.patches()),
@@ -95,9 +95,12 @@ RenderReport LatticeRenderer::render(const Snapshot& snapshot, Budget budget,
 }
 
 void LatticeRenderer::light_up(const Snapshot& snapshot) noexcept {
-  toward_sun_ = snapshot.sun.toward.unit.cast<float>();
   target_->facets.light_up(snapshot, pool_);
-  if (snapshot.sun.irradiance_w_m2 > 0.0) sun_view_.update(snapshot.sun.toward.unit, pool_);
+  const auto lamps = lamps_of(snapshot);
+  for (std::size_t k = 0; k < kLamps; ++k) {
+    toward_lamp_[k] = lamps[k]->toward.unit.cast<float>();
+    if (lamps[k]->irradiance_w_m2 > 0.0) lamp_views_[k].update(lamps[k]->toward.unit, pool_);
+  }
   body_light_.light_up(snapshot, pool_);
   bounced_.update(body_light_.to_camera(), snapshot.camera.m, pool_);
 }
@@ -223,9 +226,6 @@ void LatticeRenderer::shade(const Row& row, int column, const Tone& tone) const 
     const auto [second, third] = target_->facets.weights_at(tone.facet, middle.place);
     smooth = bounced_.at(tone.facet, second, third, body_light_.to_camera()[patch]);
   }
-  const float earthshine = target_->facets.radiance(tone.facet)[1];
-  if (earthshine > 0.0F && patch != SurfacePatches::kNone)
-    smooth += earthshine * body_light_.lit_share(1, patch);
   for (std::size_t cell = 0; cell < at(s * s); ++cell) {
     if (tone.in_cell[cell] == 0) continue;
     const auto here = static_cast<float>(tone.in_cell[cell]);
@@ -233,7 +233,8 @@ void LatticeRenderer::shade(const Row& row, int column, const Tone& tone) const 
     row.out.cover.at(column * s + static_cast<int>(cell) % s,
                      row.index * s + static_cast<int>(cell) / s) += here / all;
   }
-  if (target_->facets.radiance(tone.facet)[kSun] > 0.0F) add_sun(row, column, tone);
+  for (std::size_t k = 0; k < kLamps; ++k)
+    if (target_->facets.radiance(tone.facet)[k] > 0.0F) add_lamp(row, column, tone, k);
 
   // A path finds what is mirrored, too.
   if (crowded) return;
@@ -287,8 +288,10 @@ float LatticeRenderer::bounced_by_paths(const Row& row, int column,
   return static_cast<float>(sum / paths);
 }
 
-void LatticeRenderer::add_sun(const Row& row, int column, const Tone& tone) const noexcept {
-  const Lit whole = sun_view_.facet(tone.facet);
+void LatticeRenderer::add_lamp(const Row& row, int column, const Tone& tone,
+                               std::size_t lamp) const noexcept {
+  const LampView& view = lamp_views_[lamp];
+  const Lit whole = view.facet(tone.facet);
   if (whole == Lit::kNo) return;
   const int s = spec_.grid.oversampling;
   const int n = view_.points_a_pixel();
@@ -299,17 +302,15 @@ void LatticeRenderer::add_sun(const Row& row, int column, const Tone& tone) cons
   Vector2f per_cell_x;
   Vector2f per_cell_y;
   if (whole == Lit::kUnknown) {
-    // The pixel on the Sun's map: near enough a parallelogram.
+    // The pixel on the lamp's map: near enough a parallelogram.
     Vector3f direction;
-    corner = sun_view_.on_map(view_.place_on(tone.facet, x, y, direction).place);
-    per_cell_x =
-        (sun_view_.on_map(view_.place_on(tone.facet, x + span, y, direction).place) - corner) /
-        static_cast<float>(s);
-    per_cell_y =
-        (sun_view_.on_map(view_.place_on(tone.facet, x, y + span, direction).place) - corner) /
-        static_cast<float>(s);
+    corner = view.on_map(view_.place_on(tone.facet, x, y, direction).place);
+    per_cell_x = (view.on_map(view_.place_on(tone.facet, x + span, y, direction).place) - corner) /
+                 static_cast<float>(s);
+    per_cell_y = (view.on_map(view_.place_on(tone.facet, x, y + span, direction).place) - corner) /
+                 static_cast<float>(s);
   }
-  const float light = target_->facets.radiance(tone.facet)[kSun];
+  const float light = target_->facets.radiance(tone.facet)[lamp];
   for (std::size_t cell = 0; cell < at(s * s); ++cell) {
     if (tone.in_cell[cell] == 0) continue;
     Lit lit = whole;
@@ -319,19 +320,19 @@ void LatticeRenderer::add_sun(const Row& row, int column, const Tone& tone) cons
       const Vector2f b = a + per_cell_x;
       const Vector2f c = a + per_cell_y;
       const Vector2f d = b + per_cell_y;
-      lit = sun_view_.places(tone.facet, a.cwiseMin(b).cwiseMin(c).cwiseMin(d),
-                             a.cwiseMax(b).cwiseMax(c).cwiseMax(d));
+      lit = view.places(tone.facet, a.cwiseMin(b).cwiseMin(c).cwiseMin(d),
+                        a.cwiseMax(b).cwiseMax(c).cwiseMax(d));
     }
     if (lit == Lit::kYes) add(row, column, cell, static_cast<float>(tone.in_cell[cell]), light);
-    if (lit == Lit::kUnknown) doubt(row, column, tone, cell);
+    if (lit == Lit::kUnknown) doubt(row, column, tone, cell, lamp);
   }
 }
 
-void LatticeRenderer::doubt(const Row& row, int column, const Tone& tone,
-                            std::size_t cell) const noexcept {
+void LatticeRenderer::doubt(const Row& row, int column, const Tone& tone, std::size_t cell,
+                            std::size_t lamp) const noexcept {
   const int s = spec_.grid.oversampling;
   const std::size_t index = row.bench.doubts.size();
-  row.bench.doubts.push_back({tone.facet, column * s + static_cast<int>(cell) % s,
+  row.bench.doubts.push_back({lamp, tone.facet, column * s + static_cast<int>(cell) % s,
                               static_cast<int>(cell) / s, tone.in_cell[cell], 0, 0});
   ask(row, index, false);
 }
@@ -353,17 +354,17 @@ void LatticeRenderer::ask(const Row& row, std::size_t doubt, bool rest) const no
       const SurfacePoint point =
           view_.place_on(d.facet, static_cast<float>(i) + TriangleRaster::x_in_step(j),
                          static_cast<float>(j) + TriangleRaster::y_in_step(i), direction);
-      Queue& queue = bench.shadow_rays;
-      queue.rays.set(queue.used, point.start(), toward_sun_);
+      Queue& queue = bench.shadow_rays[d.lamp];
+      queue.rays.set(queue.used, point.start(), toward_lamp_[d.lamp]);
       queue.who[at(queue.used)] = static_cast<std::uint32_t>(doubt);
       ++d.asked;
-      if (++queue.used == RayPacket::kLanes) send_shadow_rays(bench);
+      if (++queue.used == RayPacket::kLanes) send_shadow_rays(bench, d.lamp);
     }
   }
 }
 
-void LatticeRenderer::send_shadow_rays(Bench& bench) const noexcept {
-  Queue& queue = bench.shadow_rays;
+void LatticeRenderer::send_shadow_rays(Bench& bench, std::size_t lamp) const noexcept {
+  Queue& queue = bench.shadow_rays[lamp];
   const std::size_t used = at(std::exchange(queue.used, 0));
   if (used == 0) return;
   for (std::size_t i = used; i < RayPacket::kLanes; ++i) queue.rays.active[i] = false;
@@ -397,20 +398,20 @@ void LatticeRenderer::send_mirror_rays(const Row& row) const noexcept {
 void LatticeRenderer::settle(const Row& row) const noexcept {
   Bench& bench = row.bench;
   send_mirror_rays(row);
-  send_shadow_rays(bench);
+  for (std::size_t k = 0; k < kLamps; ++k) send_shadow_rays(bench, k);
   for (std::size_t i = 0; i < bench.doubts.size(); ++i) {
     const Doubt& d = bench.doubts[i];
     // None of a few in four may be on the first points.
     if (d.asked < d.points && (d.asked == 0 || (d.hidden > 0 && d.hidden < d.asked)))
       ask(row, i, true);
   }
-  send_shadow_rays(bench);
+  for (std::size_t k = 0; k < kLamps; ++k) send_shadow_rays(bench, k);
   const int s = spec_.grid.oversampling;
   for (const Doubt& d : bench.doubts) {
     const auto asked = static_cast<float>(d.asked);
     const float lit = static_cast<float>(d.points) * (asked - static_cast<float>(d.hidden)) / asked;
     const int cell = d.cell_row * s + d.column % s;
-    add(row, d.column / s, at(cell), lit, target_->facets.radiance(d.facet)[kSun]);
+    add(row, d.column / s, at(cell), lit, target_->facets.radiance(d.facet)[d.lamp]);
   }
 }
 

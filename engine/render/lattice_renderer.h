@@ -19,7 +19,7 @@ namespace engine {
 /// Camera and Sun are far: a facet's direct light is one number a frame (Facets), and what is left
 /// of a pixel is which share of it each facet covers and which of that is in the light. The shares
 /// come from a z-buffer of 4 to 64 points a cell (LatticeView), at a tenth of what rays cost. Where
-/// the Sun's own view cannot tell light from shadow (LampView), rays ask: one point in four, and
+/// a lamp's own view cannot tell light from shadow (LampView), rays ask: one point in four, and
 /// all where these disagree. Light that bounces is kept on the body (BodyLight).
 /// The lattice is the same in each frame: what it gets wrong, below 1/64 of a cell on an edge,
 /// shows as no noise.
@@ -36,7 +36,6 @@ class LatticeRenderer final : public Renderer {
   RenderReport render(const Snapshot& snapshot, Budget budget, Radiance& out) noexcept override;
 
  private:
-  static constexpr std::size_t kSun = 0;
   static constexpr std::size_t kMostCells = 16;
   /// A facet in a pixel.
   struct Tone {
@@ -46,8 +45,9 @@ class LatticeRenderer final : public Renderer {
     float sum_x = 0;                                  // of these, in steps from the pixel's corner
     float sum_y = 0;
   };
-  /// Points of one facet in one cell, of which some are asked whether the Sun reaches them.
+  /// Points of one facet in one cell, of which some are asked whether a lamp reaches them.
   struct Doubt {
+    std::size_t lamp = 0;
     std::uint32_t facet = 0;
     int column = 0;  // of the cell in the region
     int cell_row = 0;
@@ -78,7 +78,7 @@ class LatticeRenderer final : public Renderer {
     std::vector<Tone> tones;  // of a pixel
     std::vector<Doubt> doubts;
     std::vector<Mirror> mirrors;
-    Queue shadow_rays;
+    std::array<Queue, kLamps> shadow_rays;
     Queue mirror_rays;
     RowCounts counts;
     std::atomic<bool> taken{false};
@@ -101,11 +101,12 @@ class LatticeRenderer final : public Renderer {
   void shade_pixel(const Row& row, int column) const noexcept;
   void shade(const Row& row, int column, const Tone& tone) const noexcept;
   [[nodiscard]] float bounced_by_paths(const Row& row, int column, const Tone& tone) const noexcept;
-  void add_sun(const Row& row, int column, const Tone& tone) const noexcept;
-  void doubt(const Row& row, int column, const Tone& tone, std::size_t cell) const noexcept;
+  void add_lamp(const Row& row, int column, const Tone& tone, std::size_t lamp) const noexcept;
+  void doubt(const Row& row, int column, const Tone& tone, std::size_t cell,
+             std::size_t lamp) const noexcept;
   void ask(const Row& row, std::size_t doubt, bool rest) const noexcept;
   void settle(const Row& row) const noexcept;
-  void send_shadow_rays(Bench& bench) const noexcept;
+  void send_shadow_rays(Bench& bench, std::size_t lamp) const noexcept;
   void send_mirror_rays(const Row& row) const noexcept;
   void add(const Row& row, int column, std::size_t cell, float points,
            float radiance) const noexcept;
@@ -113,7 +114,7 @@ class LatticeRenderer final : public Renderer {
   RenderSpec spec_;
   std::shared_ptr<TracedTarget> target_;
   LatticeView view_;
-  LampView sun_view_;
+  std::array<LampView, kLamps> lamp_views_;
   BodyLight body_light_;
   BouncedLight bounced_paths_;
   FacetNodes bounced_;  ///< what BodyLight sends to the camera
@@ -122,7 +123,7 @@ class LatticeRenderer final : public Renderer {
   std::vector<std::unique_ptr<Bench>> benches_;  ///< one a thread
   std::vector<RowCounts> row_counts_;            ///< by row of pixels
   // Of the frame in hand.
-  Eigen::Vector3f toward_sun_ = Eigen::Vector3f::UnitZ();
+  std::array<Eigen::Vector3f, kLamps> toward_lamp_;
 };
 
 }  // namespace engine

@@ -362,4 +362,20 @@ TEST(Scenario, AFileThatIsNotThereIsAConfigErrorWithItsName) {
   EXPECT_TRUE(starts_with(*said, "/nowhere/at_all.toml: ")) << *said;
 }
 
+TEST(Scenario, CloseUpsCameraCirclesItsTargetAtOneDistance) {
+  CommonOptions options;
+  options.file = STARLOOP_SOURCE_DIR "/config/close_up.toml";
+  const Scenario scenario = starloop::load_scenario(options);
+  const engine::KeplerPropagator camera(scenario.camera_orbit, scenario.scene.epoch);
+  const engine::KeplerPropagator target(scenario.target_orbit, scenario.scene.epoch);
+  const engine::Pass pass = starloop::chosen_pass(scenario);
+  for (int minute = 0; minute < 50; ++minute) {
+    const engine::Epoch t =
+        scenario.scene.epoch + pass.start.time_since_epoch() + engine::from_seconds(60.0 * minute);
+    const double range_m = (camera.at(t).position.m - target.at(t).position.m).norm();
+    // The circle is one to first order in eccentricity and inclination: a thousandth of itself.
+    EXPECT_NEAR(range_m, 11.8e3, 20.0) << minute;
+  }
+}
+
 }  // namespace

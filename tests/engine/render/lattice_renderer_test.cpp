@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -120,10 +121,14 @@ TEST(LatticeRenderer, ShadowOfAPlateHasItsAreaOnTheFloor) {
                                            lambert_material("black", 0.0)};
   const Snapshot snapshot =
       view_from({kRange_m * std::sin(1.3), 0, kRange_m * std::cos(1.3)}, {0, 0, 1});
-  const double open = sum_of(Rig(spec_of(96), mesh, materials).render(snapshot));
-  const double dark = sum_of(Rig(spec_of(96), shaded, materials).render(snapshot));
-  // The plate's image stands beside its shadow's: 3 m tan(1.3) = 10.8 m, beyond the floor.
-  EXPECT_NEAR(1.0 - dark / open, 4.0 / 64.0, 6e-4);  // edges of 8 m to a hundredth of a pixel
+  Snapshot by_earth = snapshot;
+  std::swap(by_earth.sun, by_earth.earthshine);
+  for (const Snapshot& lit : {snapshot, by_earth}) {
+    const double open = sum_of(Rig(spec_of(96), mesh, materials).render(lit));
+    const double dark = sum_of(Rig(spec_of(96), shaded, materials).render(lit));
+    // The plate's image stands beside its shadow's: 3 m tan(1.3) = 10.8 m, beyond the floor.
+    EXPECT_NEAR(1.0 - dark / open, 4.0 / 64.0, 6e-4);  // edges of 8 m to a hundredth of a pixel
+  }
 }
 
 TEST(LatticeRenderer, AgreesWithThePathTracerOnTheTelescope) {
