@@ -230,7 +230,8 @@ TEST(LatticeRenderer, SurvivesASnapshotThatIsNotANumber) {
   Rig rig(spec_of(64, 1), plate(), {lambert_material("white", 0.3)});
   Snapshot snapshot = view_from({0, 0, kRange_m}, {0, 0, 1});
   snapshot.sun.toward.unit = Vector3d::Constant(nan);
-  for (const float cell : rig.render(snapshot).grid.pixels()) ASSERT_TRUE(std::isfinite(cell));
+  const Radiance out = rig.render(snapshot);
+  for (const float cell : out.grid.pixels()) ASSERT_TRUE(std::isfinite(cell));
   snapshot = view_from({0, 0, kRange_m}, {0, 0, 1});
   snapshot.camera.m = Vector3d::Constant(nan);
   (void)rig.render(snapshot);
