@@ -35,7 +35,8 @@ if [[ "$full" == yes ]]; then
 else
   tools/setup.sh
   build asan
-  ctest --preset asan -j "$jobs" -LE 'long|slow'
+  # Statistics of many pictures: minutes under a sanitizer, and the same code as in the others.
+  ctest --preset asan -j "$jobs" -LE 'long|slow' -E '^PathTracerNoise'
 fi
 # Without these the checks against a real kernel are skipped, and each says so.
 tools/setup.sh --guest ||
