@@ -24,7 +24,7 @@ struct DetectorSpec {
   [[nodiscard]] int largest_dn() const noexcept { return (1 << bits) - 1; }
   /// Electrons for 1 W/m^2 on a pixel over `exposure`.
   [[nodiscard]] double electrons_per_irradiance(Duration exposure) const noexcept;
-  /// rms in electrons, of a pixel that collects `mean_e` in all: model.md's sigma.
+  /// rms in electrons, of a pixel that collects `mean_e` in all.
   [[nodiscard]] double noise_e(double mean_e) const noexcept;
 };
 [[nodiscard]] DetectorSpec read_detector(const ConfigTable& table, double pixel_pitch_m,

@@ -38,7 +38,7 @@ struct GridWish {
   int beyond_frame_px = 64;  ///< how far outside the frame light still matters
 };
 
-/// The camera's own noise, by which a renderer judges its own (model.md's sigma).
+/// The camera's own noise, by which a renderer judges its own.
 struct SensorNoise {
   double e_per_radiance = 0;    ///< electrons in a pixel for an even 1 W/m^2/sr; 0: not known
   double dark_variance_e2 = 0;  ///< of a pixel that no light falls on
