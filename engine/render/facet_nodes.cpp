@@ -93,8 +93,10 @@ float FacetNodes::at(std::uint32_t facet, float second, float third, float own) 
     const float value = values_[grid.first];
     return std::isnan(value) ? own : value;
   }
-  const float a = std::clamp(second, 0.0F, 1.0F) * static_cast<float>(grid.along_first);
-  const float b = std::clamp(third, 0.0F, 1.0F) * static_cast<float>(grid.along_second);
+  // Weights at a place that is no number are none either.
+  const auto inside = [](float weight) { return weight > 0.0F ? std::min(weight, 1.0F) : 0.0F; };
+  const float a = inside(second) * static_cast<float>(grid.along_first);
+  const float b = inside(third) * static_cast<float>(grid.along_second);
   const auto i = std::min(static_cast<unsigned>(a), grid.along_first - 1U);
   const auto k = std::min(static_cast<unsigned>(b), grid.along_second - 1U);
   const float in_a = a - static_cast<float>(i);

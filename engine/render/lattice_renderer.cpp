@@ -95,7 +95,8 @@ RenderReport LatticeRenderer::render(const Snapshot& snapshot, Budget budget,
 }
 
 void LatticeRenderer::light_up(const Snapshot& snapshot) noexcept {
-  target_->facets.light_up(snapshot, pool_);
+  target_->facets.light_up(snapshot, pool_,
+                           spec_.sun_disc == SunDisc::kOff ? 0.0 : kSunAngularRadius_rad);
   const auto lamps = lamps_of(snapshot);
   for (std::size_t k = 0; k < kLamps; ++k) {
     toward_lamp_[k] = lamps[k]->toward.unit.cast<float>();

@@ -26,7 +26,7 @@ namespace engine {
 ///
 /// A view that the lattice does not fit, with a part of the target behind the camera or nearer than
 /// its own size, is the path tracer's.
-/// Leaves out: the Sun's disc; caustics.
+/// Leaves out: the Sun's disc in shadows, not in glints; caustics.
 /// Thread: loop. Loop-safe but for the constructor.
 class LatticeRenderer final : public Renderer {
  public:

@@ -16,9 +16,9 @@ namespace engine {
 /// optics then spread light and average noise: the variance of a pixel is the sum of h_j^2 var_j
 /// over its neighbours, h a Gaussian of SensorNoise::blur_px. Noise is judged in the sensor's own
 /// sigma of the pixel's mean. A pixel is lit when its mean is above one sigma of a dark pixel; one
-/// whose mean is at full well is counted apart: its noise is clipped. Leaves out: light spread from
-/// outside the region, and noise that neighbours have in common. Thread: loop. Loop-safe but for
-/// the constructor.
+/// whose mean is at full well is counted apart: its noise is clipped.
+/// Leaves out: light spread from outside the region, and noise that neighbours have in common.
+/// Thread: loop. Loop-safe but for the constructor.
 class NoiseMap {
  public:
   /// No region is larger than `largest`.

@@ -24,10 +24,10 @@ namespace engine {
 /// pixel says where noise is, and the image is made of samples that the pilot knows nothing of
 /// (Kirk and Arvo 1991, DOI 10.1145/127719.122735): where the one stops and the other begins adds
 /// no bias. Every image is the mean of replicates, from which its own noise is known. With a
-/// deadline, samples come in passes, each as many as all before it. We differ from the print: the
-/// direct term has its cosine, and bounces are BouncedLight's. Leaves out: light that took more
-/// than `bounces` bounces, the darkening of the Sun's limb. Thread: loop. Loop-safe but for the
-/// constructor.
+/// deadline, samples come in passes, each as many as all before it.
+/// We differ from the print: the direct term has its cosine, and bounces are BouncedLight's.
+/// Leaves out: light that took more than `bounces` bounces, the darkening of the Sun's limb.
+/// Thread: loop. Loop-safe but for the constructor.
 class PathTracer final : public Renderer {
  public:
   PathTracer(const RenderSpec& spec, std::shared_ptr<TracedTarget> target, WorkerPool& pool);

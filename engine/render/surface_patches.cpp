@@ -128,8 +128,9 @@ class Scout {
 
 std::size_t SurfacePatches::Grid::cube_of(const Vector3f& place) const noexcept {
   const Vector3f cell = (place - low) * per_m;
+  // The place of a facet seen edge-on may be no number: the first cube.
   const auto along = [this](float x) {
-    return static_cast<std::size_t>(std::clamp(x, 0.0F, static_cast<float>(side - 1)));
+    return x > 0.0F ? static_cast<std::size_t>(std::min(x, static_cast<float>(side - 1))) : 0;
   };
   return (along(cell.z()) * side + along(cell.y())) * side + along(cell.x());
 }
@@ -175,7 +176,6 @@ void SurfacePatches::find(const TracedTarget& target) {
   std::vector<Cluster>& clusters = scout.clusters();
   std::stable_sort(clusters.begin(), clusters.end(),
                    [](const Cluster& a, const Cluster& b) { return a.cube < b.cube; });
-  patches_.clear();
   first_in_cube_.assign(grid_.size() + 1, 0);
   for (const Cluster& c : clusters) {
     patches_.push_back(patch_of(c));

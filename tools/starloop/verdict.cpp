@@ -1,6 +1,8 @@
 #include "tools/starloop/verdict.h"
 
 #include <fstream>
+#include <string>
+#include <vector>
 
 #include <spdlog/spdlog.h>
 #include <nlohmann/json.hpp>
@@ -52,6 +54,19 @@ void print_detections(const DetectionVerdict& verdict) {
   spdlog::info("detected in {} of the {} frames that show the target; centroid {:.3f} px rms",
                d.detected, d.detectable, d.centroid_rms_px);
   for (const std::string& sentence : verdict.not_met) spdlog::error("{}", sentence);
+}
+
+/// What the scenario asks to leave out, and what no model has yet.
+std::vector<std::string> left_out(const Scenario& s) {
+  std::vector<std::string> list = {"defocus", "PRNU, DSNU and defects"};
+  if (!s.scene.earth.in_frame) list.emplace_back("the Earth behind the target");
+  if (s.stars.source == engine::StarSpec::Source::kNone) list.emplace_back("stars");
+  const bool hard = s.render.method == engine::RenderMethod::kLattice;
+  if (s.render.sun_disc == engine::SunDisc::kOff)
+    list.emplace_back("the Sun's disc");
+  else if (hard)
+    list.emplace_back("the Sun's disc in shadows");
+  return list;
 }
 
 }  // namespace
@@ -131,10 +146,7 @@ void write_report(const std::filesystem::path& folder, const Scenario& s, const 
         {"met", open_loop ? nlohmann::json(nullptr) : nlohmann::json(v.held_good)}}},
       {"statistics", statistics_json(log)},
       {"detection", detection_json(v.detection)},
-      {"left_out",
-       {s.scene.earth.in_frame ? "stars behind the target"
-                               : "the Earth and stars behind the target",
-        "defocus", "the Sun's disc", "PRNU, DSNU and defects"}},
+      {"left_out", left_out(s)},
       {"criteria_met", open_loop ? nlohmann::json(nullptr) : nlohmann::json(v.good)}};
   std::ofstream(folder / "report.json") << report.dump(2) << "\n";
 }
