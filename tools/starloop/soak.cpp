@@ -35,8 +35,10 @@ int entries(const char* folder) {
   return static_cast<int>(std::distance(fs::directory_iterator(folder), fs::directory_iterator()));
 }
 
-/// What the process holds, but for the soak's own notes of earlier rounds.
+/// What the process holds, but for the soak's own notes of earlier rounds. The C library keeps
+/// freed pages for the next round, now more, now less (70 MiB): it gives them back first.
 void weigh(const std::vector<SoakRound>& earlier, SoakRound& round) {
+  malloc_trim(0);
   const struct mallinfo2 heap = mallinfo2();
   round.heap_bytes = heap.uordblks + heap.hblkhd;
   round.heap_bytes -= earlier.capacity() * sizeof(SoakRound);
