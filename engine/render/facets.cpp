@@ -70,13 +70,13 @@ Facets::Facets(const Mesh& mesh, std::vector<Brdf> brdfs)
   }
 }
 
-void Facets::light_up(const Snapshot& snapshot, WorkerPool& pool, double sun_radius_rad) noexcept {
+void Facets::light_up(const BodyView& view, WorkerPool& pool, double sun_radius_rad) noexcept {
   const int count = static_cast<int>(facets_.size());
-  const LampCones lamps = lamp_cones(snapshot, sun_radius_rad);
+  const LampCones lamps = lamp_cones(view, sun_radius_rad);
   pool.rows(0, (count + kFacetsAShare - 1) / kFacetsAShare, [&](int share) {
     const int last = std::min(count, (share + 1) * kFacetsAShare);
     for (int i = share * kFacetsAShare; i < last; ++i)
-      light_facet(snapshot, lamps, static_cast<std::size_t>(i));
+      light_facet(view, lamps, static_cast<std::size_t>(i));
   });
 }
 
@@ -127,12 +127,11 @@ double Facets::reflected(const Facet& facet, double side, const LampCone& lamp,
   return sum / (n * n * each);
 }
 
-void Facets::light_facet(const Snapshot& snapshot, const LampCones& lamps,
-                         std::size_t index) noexcept {
+void Facets::light_facet(const BodyView& view, const LampCones& lamps, std::size_t index) noexcept {
   const Facet& facet = facets_[index];
   radiance_[index] = {};
   const Vector3d middle = (facet.corner + (facet.edge1 + facet.edge2) / 3.0F).cast<double>();
-  const Vector3d to_camera = (snapshot.camera.m - middle).normalized();
+  const Vector3d to_camera = (view.camera.m - middle).normalized();
   const double side = facet.normal.cast<double>().dot(to_camera) >= 0.0 ? 1.0 : -1.0;
   for (std::size_t k = 0; k < kLamps; ++k) {
     if (!(lamps[k].irradiance_w_m2() > 0.0)) continue;

@@ -44,7 +44,7 @@ class Facets {
   Facets(const Mesh& mesh, std::vector<Brdf> brdfs);
 
   /// Works out the direct light of every facet, shadows apart. Sun of radius 0: a point.
-  void light_up(const Snapshot& snapshot, WorkerPool& pool,
+  void light_up(const BodyView& view, WorkerPool& pool,
                 double sun_radius_rad = kSunAngularRadius_rad) noexcept;
 
   /// What facet `triangle` sends to the camera for each lamp, in W/m^2/sr, when nothing shades it.
@@ -89,7 +89,7 @@ class Facets {
   };
   [[nodiscard]] double reflected(const Facet& facet, double side, const LampCone& lamp,
                                  const Eigen::Vector3d& to_camera) const noexcept;
-  void light_facet(const Snapshot& snapshot, const LampCones& lamps, std::size_t index) noexcept;
+  void light_facet(const BodyView& view, const LampCones& lamps, std::size_t index) noexcept;
 
   std::vector<Facet> facets_;
   std::vector<std::array<float, kLamps>> radiance_;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 namespace engine {
 namespace {
@@ -48,6 +49,14 @@ Polygon clipped(const Polygon& in, double PixelPoint::*axis, double edge, double
   return out;
 }
 
+/// The smallest rectangle that holds both.
+PixelRect around(const PixelRect& a, const PixelRect& b) noexcept {
+  if (a.empty()) return b;
+  if (b.empty()) return a;
+  return {std::min(a.left, b.left), std::min(a.top, b.top), std::max(a.right, b.right),
+          std::max(a.bottom, b.bottom)};
+}
+
 }  // namespace
 
 Footprint::Footprint(const CameraGeometry& camera, int beyond_frame_px, std::size_t vertices)
@@ -55,6 +64,7 @@ Footprint::Footprint(const CameraGeometry& camera, int beyond_frame_px, std::siz
   mask_.resize(static_cast<std::size_t>(limits_.width()) *
                static_cast<std::size_t>(limits_.height()));
   corners_.resize(vertices);
+  spans_.resize(static_cast<std::size_t>(limits_.height()));
 }
 
 void Footprint::clear() noexcept {
@@ -62,6 +72,7 @@ void Footprint::clear() noexcept {
     const auto row = mask_.begin() + static_cast<std::ptrdiff_t>(v - limits_.top) * limits_.width();
     std::fill(row + (region_.left - limits_.left), row + (region_.right - limits_.left),
               std::uint8_t{0});
+    spans_[static_cast<std::size_t>(v - limits_.top)] = {};
   }
   region_ = {};
 }
@@ -92,21 +103,20 @@ void Footprint::mark(const PixelRect& box) noexcept {
     const auto row = mask_.begin() + static_cast<std::ptrdiff_t>(v - limits_.top) * limits_.width();
     std::fill(row + (inside.left - limits_.left), row + (inside.right - limits_.left),
               std::uint8_t{1});
+    Span& span = spans_[static_cast<std::size_t>(v - limits_.top)];
+    span = span.begin == span.end
+               ? Span{inside.left, inside.right}
+               : Span{std::min(span.begin, inside.left), std::max(span.end, inside.right)};
   }
-  if (region_.empty()) {
-    region_ = inside;
-    return;
-  }
-  region_ = {std::min(region_.left, inside.left), std::min(region_.top, inside.top),
-             std::max(region_.right, inside.right), std::max(region_.bottom, inside.bottom)};
+  region_ = around(region_, inside);
 }
 
-void Footprint::project(const Mesh& mesh, const Snapshot& snapshot) noexcept {
-  clear();
-  const Eigen::Matrix3d camera_from_body = snapshot.body_from_camera.matrix.transpose();
+PixelRect Footprint::add(const Mesh& mesh, const BodyView& view) noexcept {
+  const PixelRect others = std::exchange(region_, PixelRect{});
+  const Eigen::Matrix3d camera_from_body = view.body_from_camera.matrix.transpose();
   for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
     const Eigen::Vector3d in_camera =
-        camera_from_body * (mesh.vertices[i].cast<double>() - snapshot.camera.m);
+        camera_from_body * (mesh.vertices[i].cast<double>() - view.camera.m);
     const PixelPoint p =
         camera_.project(in_camera).value_or(PixelPoint{-kOutside_px, -kOutside_px});
     corners_[i] = {std::clamp(p.u, -kOutside_px, kOutside_px),
@@ -114,6 +124,9 @@ void Footprint::project(const Mesh& mesh, const Snapshot& snapshot) noexcept {
   }
   for (const Mesh::Triangle& triangle : mesh.triangles) mark(box_round(triangle));
   measure_visible(mesh);
+  const PixelRect own = region_;
+  region_ = around(others, own);
+  return own;
 }
 
 void Footprint::measure_visible(const Mesh& mesh) noexcept {

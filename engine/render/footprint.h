@@ -9,23 +9,40 @@
 
 namespace engine {
 
-/// The pixels where the target can be: no ray is spent anywhere else.
+/// The pixels where bodies can be: no ray is spent anywhere else.
 ///
 /// Every triangle marks the pixels of its own bounding box on the detector. Conservative: a pixel
-/// that sees the target is always marked.
+/// that sees a body is always marked.
 /// Loop-safe: sized in the constructor.
 class Footprint {
  public:
   Footprint(const CameraGeometry& camera, int beyond_frame_px, std::size_t vertices);
 
-  void project(const Mesh& mesh, const Snapshot& snapshot) noexcept;
+  /// The target alone.
+  void project(const Mesh& mesh, const BodyView& view) noexcept {
+    clear();
+    static_cast<void>(add(mesh, view));
+  }
+  void clear() noexcept;
+  /// Marks one body more, of as many vertices at most as the constructor was told; the pixels round
+  /// it. visible_fraction() is its own until the next is added.
+  PixelRect add(const Mesh& mesh, const BodyView& view) noexcept;
 
   /// Of the area that all triangles have on the detector's plane, the share that lies in the frame;
   /// 0 when there is no area. A triangle with a corner behind the camera counts for none.
   [[nodiscard]] double visible_fraction() const noexcept { return visible_fraction_; }
 
-  /// Of the marked pixels; empty when the target is out of sight.
+  /// Of the marked pixels; empty when all is out of sight.
   [[nodiscard]] PixelRect region() const noexcept { return region_; }
+  /// Columns [begin, end) that hold the marked pixels of a row.
+  struct Span {
+    int begin = 0;
+    int end = 0;
+  };
+  /// Pre: the row lies in region().
+  [[nodiscard]] const Span& span(int v) const noexcept {
+    return spans_[static_cast<std::size_t>(v - limits_.top)];
+  }
   /// Pre: the pixel lies in region().
   [[nodiscard]] bool marked(int u, int v) const noexcept {
     return mask_[static_cast<std::size_t>(v - limits_.top) *
@@ -36,7 +53,6 @@ class Footprint {
  private:
   void mark(const PixelRect& box) noexcept;
   [[nodiscard]] PixelRect box_round(const Mesh::Triangle& triangle) const noexcept;
-  void clear() noexcept;
   void measure_visible(const Mesh& mesh) noexcept;
 
   CameraGeometry camera_;
@@ -44,6 +60,7 @@ class Footprint {
   PixelRect region_;
   double visible_fraction_ = 0;
   std::vector<std::uint8_t> mask_;
+  std::vector<Span> spans_;
   std::vector<PixelPoint> corners_;
 };
 

@@ -72,12 +72,12 @@ class LampCone {
 inline constexpr std::size_t kLamps = 2;
 using LampCones = std::array<LampCone, kLamps>;
 
-/// The lamps of a snapshot, in a fixed order.
-[[nodiscard]] inline std::array<const Lamp*, kLamps> lamps_of(const Snapshot& s) noexcept {
+/// The lamps of a body, in a fixed order.
+[[nodiscard]] inline std::array<const Lamp*, kLamps> lamps_of(const BodyView& s) noexcept {
   return {&s.sun, &s.earthshine};
 }
 /// Earthshine stays one direction: it is a vector irradiance.
-[[nodiscard]] inline LampCones lamp_cones(const Snapshot& s, double sun_half_angle_rad) noexcept {
+[[nodiscard]] inline LampCones lamp_cones(const BodyView& s, double sun_half_angle_rad) noexcept {
   return {LampCone(s.sun, sun_half_angle_rad), LampCone(s.earthshine, 0.0)};
 }
 

@@ -11,6 +11,7 @@ namespace engine {
 namespace {
 
 std::size_t at(int i) noexcept { return static_cast<std::size_t>(i); }
+std::ptrdiff_t to_offset(std::size_t i) noexcept { return static_cast<std::ptrdiff_t>(i); }
 
 // No pixel gets more: a rare light must not take all of a frame's time.
 constexpr int kMostSamples = 1 << 16;
@@ -29,6 +30,18 @@ Draws draws_of(const Snapshot& snapshot, int u, int v) noexcept {
   return {snapshot.seed, Stream::kLight, snapshot.sequence, place};
 }
 
+std::vector<BouncedLight> at_each(const TracedBodies& bodies, const BounceRules& rules) {
+  std::vector<BouncedLight> bounced;
+  for (std::size_t i = 0; i < bodies.count(); ++i) bounced.emplace_back(bodies.shape(i), rules);
+  return bounced;
+}
+
+/// The mean so far, with what a pass adds.
+void mix_in(double old_share, double added, float& mean) noexcept {
+  mean =
+      static_cast<float>((old_share > 0.0 ? old_share * static_cast<double>(mean) : 0.0) + added);
+}
+
 /// Samples of each cell and replicate, from samples of a pixel.
 std::uint32_t each_of(int samples, int side, int replicates) noexcept {
   const int parts = side * side * replicates;
@@ -38,11 +51,12 @@ std::uint32_t each_of(int samples, int side, int replicates) noexcept {
 }  // namespace
 
 PathTracer::PathTracer(const RenderSpec& spec, std::shared_ptr<TracedTarget> target,
-                       WorkerPool& pool)
+                       WorkerPool& pool,
+                       const std::vector<std::shared_ptr<TracedTarget>>& companions)
     : spec_(spec),
-      target_(std::move(target)),
-      bounced_(*target_, BounceRules{spec.bounces, spec.sampler, spec.exact_caustics}),
-      footprint_(spec.camera, spec.grid.beyond_frame_px, target_->mesh.vertices.size()),
+      bodies_(std::move(target), companions),
+      bounced_(at_each(bodies_, BounceRules{spec.bounces, spec.sampler, spec.exact_caustics})),
+      footprint_(spec.camera, spec.grid.beyond_frame_px, bodies_.most_vertices()),
       noise_(spec.camera.frame().grown_by(spec.grid.beyond_frame_px), spec.noise),
       pool_(pool) {
   const int side = spec.grid.oversampling;
@@ -58,33 +72,67 @@ PathTracer::PathTracer(const RenderSpec& spec, std::shared_ptr<TracedTarget> tar
   const int slots = std::max(side * side * kReplicates, kPilotReplicates);
   for (int i = 0; i < pool.threads(); ++i)
     benches_.push_back(
-        std::make_unique<Bench>(*target_, bounced_, rules, all.width(), side * side, slots));
+        std::make_unique<Bench>(bodies_, bounced_, rules, all.width(), side * side, slots));
 }
 
 RenderReport PathTracer::render(const Snapshot& snapshot, Budget budget, Radiance& out) noexcept {
   const Duration start = reads_clock(budget) ? spec_.clock() : Duration{};
-  const int s = spec_.grid.oversampling;
-  footprint_.project(target_->mesh, snapshot);
+  RenderReport report;
+  find_bodies(snapshot, report);
   out.region = footprint_.region();
-  out.oversampling = s;
   out.uniform_w_m2_sr = snapshot.background_w_m2_sr;
   out.motion_px = snapshot.smear_px;
   out.points.clear();
-  out.grid.resize(out.region.width() * s, out.region.height() * s);
-  out.cover.resize(out.grid.width(), out.grid.height());
+  size_images(out);
 
-  RenderReport report;
-  report.bounces = bounced_.bounces();
-  report.visible_fraction = footprint_.visible_fraction();
+  report.bounces = bounced_[0].bounces();
   report.add({"bounces", kNumbers[at(report.bounces)], spec_.bounces_left_out_e});
   if (out.region.empty()) return report;
-  const double glint_radius_rad = spec_.sun_disc == SunDisc::kOff ? 0.0 : kSunAngularRadius_rad;
-  target_->facets.light_up(snapshot, pool_, glint_radius_rad);
-  const TracedFrame frame(snapshot, spec_.camera, target_->bounding_radius_m,
-                          sun_radius_for(snapshot, report));
+  light_up(snapshot, report);
   std::fill(row_counts_.begin(), row_counts_.end(), RowCounts{});
-  choose_samples(frame, snapshot, budget, out.region);
-  run_passes(frame, snapshot, budget, start, out, report);
+  choose_samples(snapshot, budget, out.region);
+  run_passes(snapshot, budget, start, out, report);
+  count_up(report);
+  return report;
+}
+
+/// footprint_, and of each of frames_ the pixels.
+void PathTracer::find_bodies(const Snapshot& snapshot, RenderReport& report) noexcept {
+  footprint_.clear();
+  for (std::size_t i = 0; i < bodies_.count(); ++i) {
+    frames_[i].seen = footprint_.add(bodies_.shape(i).mesh, TracedBodies::view(snapshot, i));
+    double& visible =
+        i == 0 ? report.visible_fraction : report.visible_fraction_of_companion[i - 1];
+    visible = footprint_.visible_fraction();
+  }
+}
+
+void PathTracer::size_images(Radiance& out) const noexcept {
+  const int s = out.oversampling = spec_.grid.oversampling;
+  out.grid.resize(out.region.width() * s, out.region.height() * s);
+  out.cover.resize(out.grid.width(), out.grid.height());
+  const bool mixed = std::any_of(frames_.begin() + 1, frames_.end(),
+                                 [](const TracedFrame& frame) { return !frame.seen.empty(); });
+  out.targets_grid.resize(mixed ? out.grid.width() : 0, mixed ? out.grid.height() : 0);
+  out.targets_cover.resize(out.targets_grid.width(), out.targets_grid.height());
+}
+
+/// The facets that are seen, and the rest of frames_.
+void PathTracer::light_up(const Snapshot& snapshot, RenderReport& report) noexcept {
+  bodies_.place(snapshot);
+  const double glint_radius_rad = spec_.sun_disc == SunDisc::kOff ? 0.0 : kSunAngularRadius_rad;
+  const double sun_radius_rad = sun_radius_for(snapshot, report);
+  for (std::size_t i = 0; i < bodies_.count(); ++i) {
+    const BodyView& view = TracedBodies::view(snapshot, i);
+    const PixelRect seen = frames_[i].seen;
+    frames_[i] =
+        TracedFrame(view, spec_.camera, bodies_.shape(i).bounding_radius_m, sun_radius_rad);
+    frames_[i].seen = seen;
+    if (!seen.empty()) bodies_.light_up(i, view, pool_, glint_radius_rad);
+  }
+}
+
+void PathTracer::count_up(RenderReport& report) const noexcept {
   for (const RowCounts& counts : row_counts_) {
     report.samples += counts.samples;
     report.hits += counts.hits;
@@ -96,7 +144,6 @@ RenderReport PathTracer::render(const Snapshot& snapshot, Budget budget, Radianc
   }
   const RaysByKind& kinds = report.rays_by_kind;
   report.rays = kinds.camera + kinds.shadow + kinds.bounce + kinds.bounce_shadow;
-  return report;
 }
 
 bool PathTracer::reads_clock(const Budget& budget) const noexcept {
@@ -104,10 +151,13 @@ bool PathTracer::reads_clock(const Budget& budget) const noexcept {
 }
 
 /// Of the disc that shadow rays are spread over: an edge is as wide as the disc at the distance of
-/// what throws it, and that is no further than the target is wide.
+/// what throws it, and that is no further than the target is wide, or another body is away.
 double PathTracer::sun_radius_for(const Snapshot& snapshot, RenderReport& report) const noexcept {
-  const double widest_m = 2.0 * kSunAngularRadius_rad * 2.0 * target_->bounding_radius_m;
-  const double pixel_m = snapshot.camera.m.norm() * spec_.camera.ifov_rad();
+  const double widest_m = 2.0 * kSunAngularRadius_rad * bodies_.longest_shadow_m(snapshot);
+  double range_m = snapshot.camera.m.norm();
+  for (std::size_t i = 1; i < bodies_.count(); ++i)
+    range_m = std::min(range_m, TracedBodies::view(snapshot, i).camera.m.norm());
+  const double pixel_m = range_m * spec_.camera.ifov_rad();
   const bool shows = widest_m > kHardEdge_px * pixel_m;
   constexpr double kNotKnown = std::numeric_limits<double>::quiet_NaN();
   if (spec_.sun_disc == SunDisc::kOff) {
@@ -120,8 +170,8 @@ double PathTracer::sun_radius_for(const Snapshot& snapshot, RenderReport& report
 }
 
 /// wanted_: by the budget, by the scenario, or by a pilot.
-void PathTracer::choose_samples(const TracedFrame& frame, const Snapshot& snapshot,
-                                const Budget& budget, const PixelRect& region) noexcept {
+void PathTracer::choose_samples(const Snapshot& snapshot, const Budget& budget,
+                                const PixelRect& region) noexcept {
   const int side = spec_.grid.oversampling;
   const std::size_t pixels = at(region.width()) * at(region.height());
   const int fixed = budget.samples_per_pixel > 0 ? budget.samples_per_pixel
@@ -133,7 +183,7 @@ void PathTracer::choose_samples(const TracedFrame& frame, const Snapshot& snapsh
     return;
   }
   replicates_used_ = kReplicates;
-  pool_.rows(0, region.height(), [&](int row) { pilot_row(frame, snapshot, region, row); });
+  pool_.rows(0, region.height(), [&](int row) { pilot_row(snapshot, region, row); });
   const double limit = kPilotTrust * (budget.rho_mc > 0.0 ? budget.rho_mc : spec_.profile.rho_mc);
   const int least = side * side * kReplicates;
   noise_.plan({limit, least, kMostSamples}, region, mean_, variance_, wanted_);
@@ -142,31 +192,32 @@ void PathTracer::choose_samples(const TracedFrame& frame, const Snapshot& snapsh
 }
 
 /// mean_, and variance_ of one sample.
-void PathTracer::pilot_row(const TracedFrame& frame, const Snapshot& snapshot,
-                           const PixelRect& region, int row) noexcept {
+void PathTracer::pilot_row(const Snapshot& snapshot, const PixelRect& region, int row) noexcept {
   Bench& bench = take_bench();
   RowTracer& tracer = bench.tracer;
-  tracer.begin(frame, region.width(), 1, kPilotReplicates);
   const int v = region.top + row;
-  for (int column = 0; column < region.width(); ++column) {
-    const int u = region.left + column;
+  const Footprint::Span& span = footprint_.span(v);
+  std::fill_n(mean_.begin() + to_offset(pixel(region, 0, row)), region.width(), 0.0F);
+  std::fill_n(variance_.begin() + to_offset(pixel(region, 0, row)), region.width(), 0.0F);
+  tracer.begin(frames_, span.end - span.begin, 1, kPilotReplicates);
+  for (int u = span.begin; u < span.end; ++u) {
     if (!footprint_.marked(u, v)) continue;
     Draws draws = draws_of(snapshot, u, v);
     static_cast<void>(draws.block());  // the image's
     const auto keys = draws.block();
-    tracer.trace(column, {1.0 * u, 1.0 * v}, keys, 0, kPilotEach);
+    tracer.trace(u - span.begin, {1.0 * u, 1.0 * v}, keys, 0, kPilotEach);
     row_counts_[at(row)].samples += kPilotReplicates * kPilotEach;
   }
   tracer.finish();
-  for (int column = 0; column < region.width(); ++column) {
+  for (int u = span.begin; u < span.end; ++u) {
     double sum = 0;
     double squares = 0;
     for (int r = 0; r < kPilotReplicates; ++r) {
-      const double mean = tracer.light(column, 0, r) / kPilotEach;
+      const double mean = tracer.light(u - span.begin, 0, r) / kPilotEach;
       sum += mean;
       squares += mean * mean;
     }
-    const std::size_t i = pixel(region, column, row);
+    const std::size_t i = pixel(region, u - region.left, row);
     const double variance =
         std::max(0.0, squares - sum * sum / kPilotReplicates) / (kPilotReplicates - 1);
     mean_[i] = static_cast<float>(sum / kPilotReplicates);
@@ -176,9 +227,8 @@ void PathTracer::pilot_row(const TracedFrame& frame, const Snapshot& snapshot,
   bench.taken.store(false, std::memory_order_release);
 }
 
-void PathTracer::run_passes(const TracedFrame& frame, const Snapshot& snapshot,
-                            const Budget& budget, Duration start, Radiance& out,
-                            RenderReport& report) noexcept {
+void PathTracer::run_passes(const Snapshot& snapshot, const Budget& budget, Duration start,
+                            Radiance& out, RenderReport& report) noexcept {
   const std::size_t pixels = at(out.region.width()) * at(out.region.height());
   const std::uint32_t most =
       *std::max_element(wanted_.begin(), wanted_.begin() + static_cast<std::ptrdiff_t>(pixels));
@@ -187,8 +237,7 @@ void PathTracer::run_passes(const TracedFrame& frame, const Snapshot& snapshot,
   Pass pass{0, in_passes ? std::min(1U, most) : most};
   for (;;) {
     const Duration before = by_clock ? spec_.clock() : Duration{};
-    pool_.rows(0, out.region.height(),
-               [&](int row) { trace_row(frame, snapshot, pass, out, row); });
+    pool_.rows(0, out.region.height(), [&](int row) { trace_row(snapshot, pass, out, row); });
     ++report.passes;
     if (pass.to == most || report.passes == budget.passes) break;
     const Pass next{pass.to, std::min(most, 2 * pass.to)};
@@ -212,34 +261,52 @@ std::uint64_t PathTracer::samples_of(const Pass& pass, const PixelRect& region) 
   return samples;
 }
 
-void PathTracer::trace_row(const TracedFrame& frame, const Snapshot& snapshot, const Pass& pass,
-                           Radiance& out, int row) noexcept {
+void PathTracer::trace_row(const Snapshot& snapshot, const Pass& pass, Radiance& out,
+                           int row) noexcept {
   Bench& bench = take_bench();
   RowTracer& tracer = bench.tracer;
   const PixelRect& region = out.region;
   const int side = out.oversampling;
-  tracer.begin(frame, region.width(), side, replicates_used_);
   const int v = region.top + row;
-  for (int column = 0; column < region.width(); ++column) {
-    const int u = region.left + column;
-    const std::uint32_t to = std::min(pass.to, wanted_[pixel(region, column, row)]);
+  const Footprint::Span& span = footprint_.span(v);
+  if (pass.from == 0) clear_row(out, row);
+  tracer.begin(frames_, span.end - span.begin, side, replicates_used_);
+  for (int u = span.begin; u < span.end; ++u) {
+    const std::uint32_t to = std::min(pass.to, wanted_[pixel(region, u - region.left, row)]);
     if (!footprint_.marked(u, v) || to <= pass.from) continue;
     const auto keys = draws_of(snapshot, u, v).block();
-    tracer.trace(column, {1.0 * u, 1.0 * v}, keys, static_cast<int>(pass.from),
+    tracer.trace(u - span.begin, {1.0 * u, 1.0 * v}, keys, static_cast<int>(pass.from),
                  static_cast<int>(to));
     row_counts_[at(row)].samples +=
         static_cast<std::uint64_t>(side * side * replicates_used_) * (to - pass.from);
   }
   tracer.finish();
-  for (int column = 0; column < region.width(); ++column)
-    take_pixel(tracer, pass, out, column, row);
+  for (int u = span.begin; u < span.end; ++u) {
+    if (!footprint_.marked(u, v)) continue;
+    take_pixel(tracer, pass, out, u - span.begin, u - region.left, row);
+    if (out.targets_grid.width() > 0)
+      take_targets_part(tracer, pass, out, u - span.begin, u - region.left, row);
+  }
   count(tracer, row);
   bench.taken.store(false, std::memory_order_release);
 }
 
+/// Where nothing is to be seen nothing is traced.
+void PathTracer::clear_row(Radiance& out, int row) noexcept {
+  for (int line = row * out.oversampling; line < (row + 1) * out.oversampling; ++line) {
+    std::ranges::fill(out.grid.row(line), 0.0F);
+    std::ranges::fill(out.cover.row(line), 0.0F);
+    if (out.targets_grid.width() == 0) continue;
+    std::ranges::fill(out.targets_grid.row(line), 0.0F);
+    std::ranges::fill(out.targets_cover.row(line), 0.0F);
+  }
+  std::fill_n(replicates_.begin() + to_offset(pixel(out.region, 0, row)), out.region.width(),
+              std::array<float, kReplicates>{});
+}
+
 /// The means so far, with what the pass has added.
-void PathTracer::take_pixel(const RowTracer& tracer, const Pass& pass, Radiance& out, int column,
-                            int row) noexcept {
+void PathTracer::take_pixel(const RowTracer& tracer, const Pass& pass, Radiance& out, int traced,
+                            int column, int row) noexcept {
   const int side = out.oversampling;
   const std::size_t i = pixel(out.region, column, row);
   const std::uint32_t to = std::min(pass.to, wanted_[i]);
@@ -249,23 +316,34 @@ void PathTracer::take_pixel(const RowTracer& tracer, const Pass& pass, Radiance&
   for (int cell = 0; cell < side * side; ++cell) {
     double light = 0;
     for (int r = 0; r < replicates_used_; ++r) {
-      const double part = tracer.light(column, cell, r);
+      const double part = tracer.light(traced, cell, r);
       sums[at(r)] += part;
       light += part;
     }
     const double samples = 1.0 * replicates_used_ * to;
     float& grid = out.grid.at(column * side + cell % side, row * side + cell / side);
     float& cover = out.cover.at(column * side + cell % side, row * side + cell / side);
-    const bool first = pass.from == 0;
-    grid =
-        static_cast<float>((first ? 0.0 : old_share * static_cast<double>(grid)) + light / samples);
-    cover = static_cast<float>((first ? 0.0 : old_share * static_cast<double>(cover)) +
-                               tracer.covered(column, cell) / samples);
+    mix_in(old_share, light / samples, grid);
+    mix_in(old_share, tracer.covered(traced, cell) / samples, cover);
   }
-  for (int r = 0; r < replicates_used_; ++r) {
-    float& mean = replicates_[i][at(r)];
-    mean = static_cast<float>((pass.from == 0 ? 0.0 : old_share * static_cast<double>(mean)) +
-                              sums[at(r)] / (1.0 * side * side * to));
+  for (int r = 0; r < replicates_used_; ++r)
+    mix_in(old_share, sums[at(r)] / (1.0 * side * side * to), replicates_[i][at(r)]);
+}
+
+void PathTracer::take_targets_part(const RowTracer& tracer, const Pass& pass, Radiance& out,
+                                   int traced, int column, int row) const noexcept {
+  const int side = out.oversampling;
+  const std::uint32_t to = std::min(pass.to, wanted_[pixel(out.region, column, row)]);
+  if (pass.from > 0 && to <= pass.from) return;
+  const double old_share = static_cast<double>(pass.from) / to;
+  const double samples = 1.0 * replicates_used_ * to;
+  for (int cell = 0; cell < side * side; ++cell) {
+    const int x = column * side + cell % side;
+    const int y = row * side + cell / side;
+    double light = 0;
+    for (int r = 0; r < replicates_used_; ++r) light += tracer.targets_light(traced, cell, r);
+    mix_in(old_share, light / samples, out.targets_grid.at(x, y));
+    mix_in(old_share, tracer.covered_by_target(traced, cell) / samples, out.targets_cover.at(x, y));
   }
 }
 

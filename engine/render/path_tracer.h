@@ -11,12 +11,13 @@
 #include "engine/render/render_spec.h"
 #include "engine/render/renderer.h"
 #include "engine/render/row_tracer.h"
-#include "engine/render/traced_target.h"
+#include "engine/render/traced_bodies.h"
 
 namespace engine {
 
 /// Path tracing from the camera, eq 10-12 of Li et al. 2023: the lamps by next-event estimation,
-/// bounces by sampling the BRDF. The reference for every other renderer.
+/// bounces by sampling the BRDF. The reference for every other renderer, and the one that knows
+/// several bodies: they hide, shade and light each other.
 ///
 /// Rays run in double up to the target and in single precision only there: from 100 km away single
 /// precision costs half a pixel.
@@ -30,7 +31,9 @@ namespace engine {
 /// Thread: loop. Loop-safe but for the constructor.
 class PathTracer final : public Renderer {
  public:
-  PathTracer(const RenderSpec& spec, std::shared_ptr<TracedTarget> target, WorkerPool& pool);
+  /// Snapshots must have as many companions. Some may share their mesh: one TracedTarget.
+  PathTracer(const RenderSpec& spec, std::shared_ptr<TracedTarget> target, WorkerPool& pool,
+             const std::vector<std::shared_ptr<TracedTarget>>& companions = {});
 
   RenderReport render(const Snapshot& snapshot, Budget budget, Radiance& out) noexcept override;
 
@@ -58,21 +61,27 @@ class PathTracer final : public Renderer {
     std::uint32_t to = 0;
   };
 
-  void choose_samples(const TracedFrame& frame, const Snapshot& snapshot, const Budget& budget,
+  void find_bodies(const Snapshot& snapshot, RenderReport& report) noexcept;
+  void size_images(Radiance& out) const noexcept;
+  void light_up(const Snapshot& snapshot, RenderReport& report) noexcept;
+  void choose_samples(const Snapshot& snapshot, const Budget& budget,
                       const PixelRect& region) noexcept;
-  void pilot_row(const TracedFrame& frame, const Snapshot& snapshot, const PixelRect& region,
-                 int row) noexcept;
+  void pilot_row(const Snapshot& snapshot, const PixelRect& region, int row) noexcept;
   /// `start`: when the frame began, by the clock that it is to be ready by.
-  void run_passes(const TracedFrame& frame, const Snapshot& snapshot, const Budget& budget,
-                  Duration start, Radiance& out, RenderReport& report) noexcept;
-  void trace_row(const TracedFrame& frame, const Snapshot& snapshot, const Pass& pass,
-                 Radiance& out, int row) noexcept;
-  void take_pixel(const RowTracer& tracer, const Pass& pass, Radiance& out, int column,
+  void run_passes(const Snapshot& snapshot, const Budget& budget, Duration start, Radiance& out,
+                  RenderReport& report) noexcept;
+  void trace_row(const Snapshot& snapshot, const Pass& pass, Radiance& out, int row) noexcept;
+  void clear_row(Radiance& out, int row) noexcept;
+  /// `traced`: the column by the tracer's count.
+  void take_pixel(const RowTracer& tracer, const Pass& pass, Radiance& out, int traced, int column,
                   int row) noexcept;
+  void take_targets_part(const RowTracer& tracer, const Pass& pass, Radiance& out, int traced,
+                         int column, int row) const noexcept;
   [[nodiscard]] bool reads_clock(const Budget& budget) const noexcept;
   [[nodiscard]] std::uint64_t samples_of(const Pass& pass, const PixelRect& region) const noexcept;
   void report_noise(const PixelRect& region, std::uint32_t reached, RenderReport& report) noexcept;
   void count(const RowTracer& tracer, int row) noexcept;
+  void count_up(RenderReport& report) const noexcept;
   [[nodiscard]] double sun_radius_for(const Snapshot& snapshot,
                                       RenderReport& report) const noexcept;
   [[nodiscard]] Bench& take_bench() noexcept;
@@ -82,8 +91,9 @@ class PathTracer final : public Renderer {
   }
 
   RenderSpec spec_;
-  std::shared_ptr<TracedTarget> target_;
-  BouncedLight bounced_;
+  TracedBodies bodies_;
+  std::vector<BouncedLight> bounced_;  ///< by body
+  TracedFrames frames_;                ///< by body
   Footprint footprint_;
   NoiseMap noise_;
   WorkerPool& pool_;

@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "engine/core/contract.h"
 #include "engine/render/bounce_depth.h"
 #include "engine/render/bounced_light.h"
 #include "engine/render/lattice_renderer.h"
@@ -52,11 +53,17 @@ RenderSpec read_render(const ConfigTable& table) {
   return spec;
 }
 
-std::unique_ptr<Renderer> make_renderer(const RenderSpec& spec,
-                                        std::shared_ptr<TracedTarget> target, WorkerPool& pool) {
-  const RenderSpec settled = with_bounces_settled(spec, *target);
+std::unique_ptr<Renderer> make_renderer(
+    const RenderSpec& spec, std::shared_ptr<TracedTarget> target, WorkerPool& pool,
+    const std::vector<std::shared_ptr<TracedTarget>>& companions) {
+  RenderSpec settled = with_bounces_settled(spec, *target);
+  for (const auto& companion : companions) {
+    const RenderSpec its = with_bounces_settled(spec, *companion);
+    if (its.bounces > settled.bounces) settled = its;
+  }
   if (settled.method == RenderMethod::kPaths)
-    return std::make_unique<PathTracer>(settled, std::move(target), pool);
+    return std::make_unique<PathTracer>(settled, std::move(target), pool, companions);
+  ENSURE(companions.empty());
   return std::make_unique<LatticeRenderer>(settled, std::move(target), pool);
 }
 

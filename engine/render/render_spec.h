@@ -2,6 +2,7 @@
 
 #include <limits>
 #include <memory>
+#include <vector>
 
 #include "engine/core/config_reader.h"
 #include "engine/core/worker_pool.h"
@@ -55,9 +56,9 @@ struct RenderSpec {
 };
 [[nodiscard]] RenderSpec read_render(const ConfigTable& table);
 
-/// The renderer that the spec asks for. May throw.
-[[nodiscard]] std::unique_ptr<Renderer> make_renderer(const RenderSpec& spec,
-                                                      std::shared_ptr<TracedTarget> target,
-                                                      WorkerPool& pool);
+/// The renderer that the spec asks for. May throw. Pre: with companions the method is kPaths.
+[[nodiscard]] std::unique_ptr<Renderer> make_renderer(
+    const RenderSpec& spec, std::shared_ptr<TracedTarget> target, WorkerPool& pool,
+    const std::vector<std::shared_ptr<TracedTarget>>& companions = {});
 
 }  // namespace engine

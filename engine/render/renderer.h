@@ -25,6 +25,9 @@ struct Radiance {
   int oversampling = 3;
   RadianceImage grid;
   CoverImage cover;  ///< of the same cells: what lies behind them shows through the rest
+  /// What of the grid and of the cover is the target's own; empty where no companion is in sight.
+  RadianceImage targets_grid;
+  CoverImage targets_cover;
   std::vector<PointSource> points;  ///< inside the region
   double uniform_w_m2_sr = 0;
   /// Behind it all, and none of the renderer's business: the imaging chain draws it.
@@ -97,6 +100,7 @@ struct RenderReport {
   /// outside. By area, each layer of surface for itself; the same as of the outline for a convex
   /// body.
   double visible_fraction = 0;
+  std::array<double, kMostCompanions> visible_fraction_of_companion{};
   NoiseReached rho_mc;
   static constexpr std::size_t kMostRungs = 8;
   std::array<Rung, kMostRungs> rungs{};  ///< those with a name

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 namespace engine {
@@ -16,31 +17,37 @@ std::size_t at(int i) noexcept { return static_cast<std::size_t>(i); }
 
 }  // namespace
 
-TracedFrame::TracedFrame(const Snapshot& snapshot, const CameraGeometry& camera,
+TracedFrame::TracedFrame(const BodyView& view, const CameraGeometry& camera,
                          double bounding_radius_m, double sun_radius_rad) noexcept
-    : lamps(lamp_cones(snapshot, sun_radius_rad)), origin(snapshot.camera.m) {
-  const Matrix3d& axes = snapshot.body_from_camera.matrix;
+    : lamps(lamp_cones(view, sun_radius_rad)), origin(view.camera.m) {
+  const Matrix3d& axes = view.body_from_camera.matrix;
   at_zero = axes * camera.direction_at({0.0, 0.0});
   per_u = axes.col(0) * camera.ifov_rad();
   per_v = axes.col(1) * camera.ifov_rad();
-  advance = std::max(0.0, snapshot.camera.m.norm() - 1.2 * bounding_radius_m);
+  advance = std::max(0.0, view.camera.m.norm() - 1.2 * bounding_radius_m);
 }
 
-RowTracer::RowTracer(const TracedTarget& target, const BouncedLight& bounced, const Rules& rules,
-                     int most_columns, int most_cells, int most_slots)
-    : target_(target),
+RowTracer::RowTracer(const TracedBodies& bodies, std::span<const BouncedLight> bounced,
+                     const Rules& rules, int most_columns, int most_cells, int most_slots)
+    : bodies_(bodies),
       bounced_(bounced),
       rules_(rules),
-      light_(at(most_columns * most_slots)),
-      covered_(at(most_columns * most_cells)) {}
+      light_(at(most_columns * most_slots) * (several() ? 2 : 1)),
+      covered_(at(most_columns * most_cells) * (several() ? 2 : 1)),
+      desks_(bodies.count()),
+      looks_(bodies.count()) {
+  // Fewer than a packet at each desk, and a packet from the camera: no desk ever holds more than
+  // all of them.
+  for (Desk& desk : desks_) desk.waiting.resize(kLanes * (bodies.count() + 1));
+}
 
-void RowTracer::begin(const TracedFrame& frame, int columns, int side, int replicates) noexcept {
-  frame_ = &frame;
+void RowTracer::begin(const TracedFrames& frames, int columns, int side, int replicates) noexcept {
+  frames_ = &frames;
   columns_ = columns;
   side_ = side;
   replicates_ = replicates;
-  std::fill_n(light_.begin(), columns * side * side * replicates, 0.0);
-  std::fill_n(covered_.begin(), columns * side * side, 0U);
+  std::fill_n(light_.begin(), (several() ? 2 : 1) * companions_slots(), 0.0);
+  std::fill_n(covered_.begin(), (several() ? 2 : 1) * companions_cells(), 0U);
   counts_ = {};
   hits_ = 0;
 }
@@ -50,7 +57,7 @@ void RowTracer::trace(int column, PixelPoint pixel, std::span<const std::uint32_
   const int cells = side_ * side_;
   // In 2^-32, so that no rounding makes the share another one.
   const auto share = static_cast<std::uint64_t>(
-      std::llround(0x1p32 * (bounced_.bounces() > 0 ? rules_.bounce_share : 0.0)));
+      std::llround(0x1p32 * (bounced_[0].bounces() > 0 ? rules_.bounce_share : 0.0)));
   CameraQueue& q = camera_;
   for (int r = 0; r < replicates_; ++r) {
     const std::uint32_t key = keys[at(r)];
@@ -81,16 +88,16 @@ void RowTracer::trace(int column, PixelPoint pixel, std::span<const std::uint32_
 
 /// Through the places of the samples in hand. In double up to the target; what rays of a packet
 /// differ by is small, and single precision is enough.
-void RowTracer::aim(RayPacket& rays) noexcept {
+void RowTracer::aim(const TracedFrame& frame, RayPacket& rays) const noexcept {
   const CameraQueue& q = camera_;
-  const Vector3d corner = frame_->at_zero + q.corner.u * frame_->per_u + q.corner.v * frame_->per_v;
+  const Vector3d corner = frame.at_zero + q.corner.u * frame.per_u + q.corner.v * frame.per_v;
   const double cell_px = 1.0 / side_;
-  const Vector3f start = (frame_->origin + frame_->advance * corner).cast<float>();
+  const Vector3f start = (frame.origin + frame.advance * corner).cast<float>();
   const Vector3f direction = corner.cast<float>();
-  const Vector3f start_u = (cell_px * frame_->advance * frame_->per_u).cast<float>();
-  const Vector3f start_v = (cell_px * frame_->advance * frame_->per_v).cast<float>();
-  const Vector3f per_u = (cell_px * frame_->per_u).cast<float>();
-  const Vector3f per_v = (cell_px * frame_->per_v).cast<float>();
+  const Vector3f start_u = (cell_px * frame.advance * frame.per_u).cast<float>();
+  const Vector3f start_v = (cell_px * frame.advance * frame.per_v).cast<float>();
+  const Vector3f per_u = (cell_px * frame.per_u).cast<float>();
+  const Vector3f per_v = (cell_px * frame.per_v).cast<float>();
   SampleLanes lanes;
   lanes.places(rules_.sequence, q.place_key, q.place);
   for (std::size_t i = 0; i < kLanes; ++i) {
@@ -105,37 +112,89 @@ void RowTracer::aim(RayPacket& rays) noexcept {
   }
 }
 
+/// Whether the pixel of a sample in hand is one where the body can be.
+bool RowTracer::may_see(const TracedFrame& frame, std::size_t lane) const noexcept {
+  const int u =
+      static_cast<int>(camera_.corner.u + 0.5) + static_cast<int>(camera_.cell_u[lane]) / side_;
+  const int v = static_cast<int>(camera_.corner.v + 0.5);
+  return u >= frame.seen.left && u < frame.seen.right && v >= frame.seen.top &&
+         v < frame.seen.bottom;
+}
+
+/// looks_: of each body, what is seen of it past all others.
+void RowTracer::look_at_all(std::size_t used) noexcept {
+  std::array<double, kLanes> nearest;
+  std::array<std::size_t, kLanes> whose{};
+  nearest.fill(std::numeric_limits<double>::infinity());
+  for (std::size_t body = 0; body < bodies_.count(); ++body) {
+    const TracedFrame& frame = (*frames_)[body];
+    Look& look = looks_[body];
+    look.hits.fill({});
+    look.rays.active.fill(false);
+    bool any = false;
+    for (std::size_t i = 0; i < used; ++i) {
+      look.rays.active[i] = may_see(frame, i);
+      any = any || look.rays.active[i];
+    }
+    if (!any) continue;
+    aim(frame, look.rays);
+    bodies_.shape(body).scene.intersect(look.rays, look.hits, counts_[0], RayCoherence::kParallel);
+    for (std::size_t i = 0; i < used; ++i) {
+      MeshHit& hit = look.hits[i];
+      if (hit.triangle == MeshHit::kNone) continue;
+      const double lengths = frame.advance + bodies_.lengths_to(body, look.rays, i, hit);
+      if (lengths < nearest[i]) {
+        if (nearest[i] < std::numeric_limits<double>::infinity()) looks_[whose[i]].hits[i] = {};
+        nearest[i] = lengths;
+        whose[i] = body;
+      } else {
+        hit = {};
+      }
+    }
+  }
+}
+
 void RowTracer::send_camera_rays() noexcept {
-  RayPacket rays;
-  aim(rays);
   const auto used = at(std::exchange(camera_.used, 0));
-  std::fill_n(rays.active.begin(), used, true);
-  std::array<MeshHit, kLanes> hits;
-  target_.scene.intersect(rays, hits, counts_[0], RayCoherence::kParallel);
+  if (several()) {
+    look_at_all(used);
+  } else {
+    RayPacket& rays = looks_[0].rays;
+    aim((*frames_)[0], rays);
+    rays.active.fill(false);
+    std::fill_n(rays.active.begin(), used, true);
+    bodies_.shape(0).scene.intersect(rays, looks_[0].hits, counts_[0], RayCoherence::kParallel);
+  }
+  for (std::size_t body = 0; body < bodies_.count(); ++body) take_hits(body, looks_[body], used);
+  bounce_all_from(kLanes);
+}
+
+void RowTracer::take_hits(std::size_t body, const Look& look, std::size_t used) noexcept {
+  const RayPacket& rays = look.rays;
+  Desk& desk = desks_[body];
+  const std::size_t cells = body > 0 ? companions_cells() : 0;
   std::array<SurfacePoint, kLanes> points;
   bool any = false;
   for (std::size_t i = 0; i < used; ++i) {
-    if (hits[i].triangle == MeshHit::kNone) continue;
+    if (look.hits[i].triangle == MeshHit::kNone) continue;
     any = true;
     ++hits_;
-    ++covered_[camera_.cell[i]];
+    ++covered_[camera_.cell[i] + cells];
     const Vector3f direction(rays.direction_x[i], rays.direction_y[i], rays.direction_z[i]);
-    points[i] = target_.facets.at(hits[i], direction);
+    points[i] = bodies_.facets(body).at(look.hits[i], direction);
     if (camera_.bouncing[i] < 0) continue;
-    waiting_[paths_++] = {{points[i], direction.normalized(),
-                           SampleNumbers(rules_.sequence, camera_.key[i],
-                                         static_cast<std::uint32_t>(camera_.bouncing[i]))},
-                          camera_.slot[i]};
+    desk.waiting[desk.paths++] = {{points[i], direction.normalized(),
+                                   SampleNumbers(rules_.sequence, camera_.key[i],
+                                                 static_cast<std::uint32_t>(camera_.bouncing[i]))},
+                                  slot_at(body, i)};
   }
-  if (!any) return;
-  light_directly(points, hits);
-  while (paths_ >= kLanes) bounce(kLanes);
+  if (any) light_directly(body, points, look.hits);
 }
 
-void RowTracer::light_directly(const std::array<SurfacePoint, kLanes>& points,
+void RowTracer::light_directly(std::size_t body, const std::array<SurfacePoint, kLanes>& points,
                                const std::array<MeshHit, kLanes>& hits) noexcept {
   for (std::size_t k = 0; k < kLamps; ++k) {
-    const LampCone& lamp = frame_->lamps[k];
+    const LampCone& lamp = (*frames_)[body].lamps[k];
     if (!(lamp.irradiance_w_m2() > 0.0)) continue;
     RayPacket toward;
     if (!lamp.parallel()) {
@@ -146,72 +205,93 @@ void RowTracer::light_directly(const std::array<SurfacePoint, kLanes>& points,
     const Vector3f axis = lamp.axis().cast<float>();
     for (std::size_t i = 0; i < kLanes; ++i) {
       if (hits[i].triangle == MeshHit::kNone) continue;
-      const float light = target_.facets.radiance(hits[i].triangle)[k];
+      const float light = bodies_.facets(body).radiance(hits[i].triangle)[k];
       if (light <= 0.0F) continue;
       const Vector3f way = lamp.parallel() ? axis
                                            : Vector3f(toward.direction_x[i], toward.direction_y[i],
                                                       toward.direction_z[i]);
-      ask(direct_[k], RayCoherence::kParallel, counts_[1], points[i], way, camera_.slot[i],
-          static_cast<double>(light));
+      ask(body, desks_[body].direct[k], RayCoherence::kParallel, counts_[1], points[i], way,
+          slot_at(body, i), static_cast<double>(light));
     }
   }
 }
 
-void RowTracer::ask(ShadowQueue& queue, RayCoherence coherence, RayCounts& counts,
+void RowTracer::ask(std::size_t body, ShadowQueue& queue, RayCoherence coherence, RayCounts& counts,
                     const SurfacePoint& from, const Vector3f& toward, std::uint32_t slot,
                     double light) noexcept {
   queue.rays.set(queue.used, from.start(), toward);
   queue.slot[at(queue.used)] = slot;
   queue.light[at(queue.used)] = light;
-  if (++queue.used == RayPacket::kLanes) send(queue, coherence, counts);
+  if (++queue.used == RayPacket::kLanes) send(body, queue, coherence, counts);
 }
 
-void RowTracer::send(ShadowQueue& queue, RayCoherence coherence, RayCounts& counts) noexcept {
+void RowTracer::send(std::size_t body, ShadowQueue& queue, RayCoherence coherence,
+                     RayCounts& counts) noexcept {
   const auto used = at(std::exchange(queue.used, 0));
   if (used == 0) return;
   for (std::size_t i = used; i < kLanes; ++i) queue.rays.active[i] = false;
   std::array<bool, kLanes> blocked{};
-  target_.scene.occluded(queue.rays, blocked, counts, coherence);
+  bodies_.occluded(body, queue.rays, blocked, counts, coherence);
   for (std::size_t i = 0; i < used; ++i)
     if (!blocked[i]) light_[queue.slot[i]] += queue.light[i];
 }
 
-/// The last `count` of those that wait go on by one place. Pre: count <= paths_, kLanes.
-void RowTracer::bounce(std::size_t count) noexcept {
+/// Until nowhere so many paths wait. Those that come to another body wait there.
+void RowTracer::bounce_all_from(std::size_t least) noexcept {
+  for (bool more = true; more;) {
+    more = false;
+    for (std::size_t body = 0; body < desks_.size(); ++body) {
+      while (desks_[body].paths >= least) {
+        bounce(body, std::min(desks_[body].paths, kLanes));
+        more = desks_.size() > 1;
+      }
+    }
+  }
+}
+
+/// The last `count` of those that wait go on by one place. Pre: count <= desk.paths, kLanes.
+void RowTracer::bounce(std::size_t body, std::size_t count) noexcept {
+  Desk& desk = desks_[body];
   RayPacket rays;
-  const std::size_t first = paths_ - count;
+  const std::size_t first = desk.paths - count;
   std::array<Waiting, kLanes> going;
   std::size_t alive = 0;
-  for (std::size_t i = first; i < paths_; ++i) {
-    Waiting& w = waiting_[i];
-    if (!bounced_.go_on(w.path)) continue;
+  for (std::size_t i = first; i < desk.paths; ++i) {
+    Waiting& w = desk.waiting[i];
+    if (!bounced_[body].go_on(w.path)) continue;
     rays.set(static_cast<int>(alive), w.path.from.start(), w.path.direction);
     going[alive++] = w;
   }
-  paths_ = first;
-  std::array<MeshHit, kLanes> hits;
-  target_.scene.intersect(rays, hits, counts_[2], RayCoherence::kScattered);
+  desk.paths = first;
+  BodyHits met;
+  bodies_.intersect(body, rays, met, counts_[2], RayCoherence::kScattered);
   for (std::size_t i = 0; i < alive; ++i) {
     Waiting& w = going[i];
-    if (hits[i].triangle == MeshHit::kNone) {
-      light_[w.slot] += bounced_.escaped(frame_->lamps, w.path) / rules_.bounce_share;
+    const std::size_t there = met.body[i];
+    if (met.hit[i].triangle == MeshHit::kNone) {
+      light_[w.slot] +=
+          bounced_[body].escaped((*frames_)[body].lamps, w.path) / rules_.bounce_share;
       continue;
     }
-    const BouncedLight::Question question =
-        bounced_.arrive(frame_->lamps, w.path, target_.facets.at(hits[i], w.path.direction));
+    if (there != body) w.path.direction = bodies_.turned(body, there, w.path.direction);
+    const BouncedLight::Question question = bounced_[there].arrive(
+        (*frames_)[there].lamps, w.path, bodies_.facets(there).at(met.hit[i], w.path.direction));
     if (question.light_w_m2_sr > 0.0) {
-      ask(bounced_shadow_, RayCoherence::kScattered, counts_[3], w.path.from, question.toward,
-          w.slot, question.light_w_m2_sr / rules_.bounce_share);
+      ask(there, desks_[there].bounced_shadow, RayCoherence::kScattered, counts_[3], w.path.from,
+          question.toward, w.slot, question.light_w_m2_sr / rules_.bounce_share);
     }
-    if (!bounced_.longest(w.path)) waiting_[paths_++] = w;
+    if (!bounced_[there].longest(w.path)) desks_[there].waiting[desks_[there].paths++] = w;
   }
 }
 
 void RowTracer::finish() noexcept {
   if (camera_.used > 0) send_camera_rays();
-  while (paths_ > 0) bounce(std::min(paths_, kLanes));
-  for (ShadowQueue& queue : direct_) send(queue, RayCoherence::kParallel, counts_[1]);
-  send(bounced_shadow_, RayCoherence::kScattered, counts_[3]);
+  bounce_all_from(1);
+  for (std::size_t body = 0; body < desks_.size(); ++body) {
+    for (ShadowQueue& queue : desks_[body].direct)
+      send(body, queue, RayCoherence::kParallel, counts_[1]);
+    send(body, desks_[body].bounced_shadow, RayCoherence::kScattered, counts_[3]);
+  }
 }
 
 }  // namespace engine

@@ -5,13 +5,15 @@
 #include "engine/render/bounced_light.h"
 #include "engine/render/renderer.h"
 #include "engine/render/sample_lanes.h"
+#include "engine/render/traced_bodies.h"
 #include "engine/scene/camera_geometry.h"
 
 namespace engine {
 
-/// What is the same for all pixels of a frame.
+/// What is the same for all pixels of a frame that see a body, in its axes.
 struct TracedFrame {
-  TracedFrame(const Snapshot& snapshot, const CameraGeometry& camera, double bounding_radius_m,
+  TracedFrame() = default;
+  TracedFrame(const BodyView& view, const CameraGeometry& camera, double bounding_radius_m,
               double sun_radius_rad) noexcept;
 
   LampCones lamps;
@@ -19,8 +21,11 @@ struct TracedFrame {
   Eigen::Vector3d at_zero;  ///< direction at pixel (0, 0)
   Eigen::Vector3d per_u;    ///< and how it changes
   Eigen::Vector3d per_v;
-  double advance = 0;  ///< how many direction lengths to skip before the target
+  double advance = 0;  ///< how many direction lengths to skip before the body
+  PixelRect seen;      ///< of the pixels where the body can be
 };
+/// By body.
+using TracedFrames = std::array<TracedFrame, TracedBodies::kMost>;
 
 /// A row of pixels under way: rays wait here until they are a packet.
 ///
@@ -36,12 +41,12 @@ class RowTracer {
     SequenceKind sequence = SequenceKind::kSobol;
     double bounce_share = 1;
   };
-  /// `most_cells` of a pixel, and `most_slots`: cells times replicates.
-  RowTracer(const TracedTarget& target, const BouncedLight& bounced, const Rules& rules,
+  /// `bounced`: one a body. `most_cells` of a pixel, and `most_slots`: cells times replicates.
+  RowTracer(const TracedBodies& bodies, std::span<const BouncedLight> bounced, const Rules& rules,
             int most_columns, int most_cells, int most_slots);
 
   /// `side`: cells on a side of a pixel.
-  void begin(const TracedFrame& frame, int columns, int side, int replicates) noexcept;
+  void begin(const TracedFrames& frames, int columns, int side, int replicates) noexcept;
   /// Samples [first, last) of each cell and replicate. `keys`: one a replicate.
   void trace(int column, PixelPoint pixel, std::span<const std::uint32_t> keys, int first,
              int last) noexcept;
@@ -49,10 +54,19 @@ class RowTracer {
 
   /// Sums over the samples of a cell, W/m^2/sr. After finish().
   [[nodiscard]] double light(int column, int cell, int replicate) const noexcept {
-    return light_[slot(column, cell, replicate)];
+    const double own = targets_light(column, cell, replicate);
+    return several() ? own + light_[slot(column, cell, replicate) + companions_slots()] : own;
   }
   [[nodiscard]] std::uint32_t covered(int column, int cell) const noexcept {
-    return covered_[static_cast<std::size_t>(column * side_ * side_ + cell)];
+    const std::uint32_t own = covered_by_target(column, cell);
+    return several() ? own + covered_[cell_of(column, cell) + companions_cells()] : own;
+  }
+  /// Of this, what comes from the target.
+  [[nodiscard]] double targets_light(int column, int cell, int replicate) const noexcept {
+    return light_[slot(column, cell, replicate)];
+  }
+  [[nodiscard]] std::uint32_t covered_by_target(int column, int cell) const noexcept {
+    return covered_[cell_of(column, cell)];
   }
   [[nodiscard]] const RayCounts& camera_rays() const noexcept { return counts_[0]; }
   [[nodiscard]] const RayCounts& shadow_rays() const noexcept { return counts_[1]; }
@@ -87,33 +101,61 @@ class RowTracer {
     BouncedLight::Path path;
     std::uint32_t slot = 0;
   };
+  /// What waits at a body, in its axes.
+  struct Desk {
+    std::array<ShadowQueue, kLamps> direct;
+    ShadowQueue bounced_shadow;
+    std::vector<Waiting> waiting;  // the last come go first
+    std::size_t paths = 0;
+  };
+  /// Rays of the camera, and what they meet of a body.
+  struct Look {
+    RayPacket rays;
+    std::array<MeshHit, kLanes> hits;
+  };
 
+  [[nodiscard]] bool several() const noexcept { return bodies_.count() > 1; }
+  /// The target's slots and cells come first, those of all companions after them.
+  [[nodiscard]] std::size_t companions_slots() const noexcept { return slot(columns_, 0, 0); }
+  [[nodiscard]] std::size_t companions_cells() const noexcept { return cell_of(columns_, 0); }
+  [[nodiscard]] std::size_t cell_of(int column, int cell) const noexcept {
+    return static_cast<std::size_t>(column * side_ * side_ + cell);
+  }
   [[nodiscard]] std::size_t slot(int column, int cell, int replicate) const noexcept {
     return static_cast<std::size_t>((column * side_ * side_ + cell) * replicates_ + replicate);
   }
-  void aim(RayPacket& rays) noexcept;
+  void aim(const TracedFrame& frame, RayPacket& rays) const noexcept;
+  [[nodiscard]] bool may_see(const TracedFrame& frame, std::size_t lane) const noexcept;
+  void look_at_all(std::size_t used) noexcept;
   void send_camera_rays() noexcept;
-  void light_directly(const std::array<SurfacePoint, kLanes>& points,
+  void take_hits(std::size_t body, const Look& look, std::size_t used) noexcept;
+  void light_directly(std::size_t body, const std::array<SurfacePoint, kLanes>& points,
                       const std::array<MeshHit, kLanes>& hits) noexcept;
-  void ask(ShadowQueue& queue, RayCoherence coherence, RayCounts& counts, const SurfacePoint& from,
-           const Eigen::Vector3f& toward, std::uint32_t slot, double light) noexcept;
-  void send(ShadowQueue& queue, RayCoherence coherence, RayCounts& counts) noexcept;
-  void bounce(std::size_t count) noexcept;
+  /// Light of a camera's sample that meets this body first.
+  [[nodiscard]] std::uint32_t slot_at(std::size_t body, std::size_t lane) const noexcept {
+    return camera_.slot[lane] +
+           static_cast<std::uint32_t>(body > 0 ? companions_slots() : std::size_t{0});
+  }
+  void ask(std::size_t body, ShadowQueue& queue, RayCoherence coherence, RayCounts& counts,
+           const SurfacePoint& from, const Eigen::Vector3f& toward, std::uint32_t slot,
+           double light) noexcept;
+  void send(std::size_t body, ShadowQueue& queue, RayCoherence coherence,
+            RayCounts& counts) noexcept;
+  void bounce_all_from(std::size_t least) noexcept;
+  void bounce(std::size_t body, std::size_t count) noexcept;
 
-  const TracedTarget& target_;
-  const BouncedLight& bounced_;
+  const TracedBodies& bodies_;
+  std::span<const BouncedLight> bounced_;
   Rules rules_;
-  const TracedFrame* frame_ = nullptr;
+  const TracedFrames* frames_ = nullptr;
   int columns_ = 0;
   int side_ = 1;
   int replicates_ = 1;
   std::vector<double> light_;           // by slot
   std::vector<std::uint32_t> covered_;  // by cell
   CameraQueue camera_;
-  std::array<ShadowQueue, kLamps> direct_;
-  ShadowQueue bounced_shadow_;
-  std::array<Waiting, 3 * kLanes> waiting_;  // the last come go first
-  std::size_t paths_ = 0;
+  std::vector<Desk> desks_;  // by body
+  std::vector<Look> looks_;  // by body
   std::array<RayCounts, 4> counts_{};
   std::uint64_t hits_ = 0;
 };

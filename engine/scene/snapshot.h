@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 
 #include "engine/core/image.h"
@@ -38,34 +39,49 @@ struct SkyView {
   Velocity<J2000> velocity;  ///< against the solar system's barycentre; 0: light paths are straight
 };
 
-/// One exposure with its geometry resolved, at mid-exposure.
-struct Snapshot {
-  std::uint64_t sequence = 0;
-  std::uint64_t seed = 0;
-  SimTime shutter_open{};
-  Duration exposure{};
-
-  Position<BodyFrame> camera;                         ///< where the camera is, seen by the target
+/// How a body is seen and lit, in its own axes.
+struct BodyView {
+  Position<BodyFrame> camera;                         ///< where the camera is, seen by the body
   Rotation<BodyFrame, CameraFrame> body_from_camera;  ///< aberration already taken out
-  PixelPoint target_px;  ///< the image of the target's centre; far outside if behind the camera
+  PixelPoint target_px;  ///< the image of its centre; far outside if behind the camera
   PixelPoint smear_px;   ///< how that image moves from shutter open to shutter close
   double range_m = 0;
-  double range_rate_m_s = 0;
-  double line_of_sight_rate_rad_s = 0;
-  double phase_angle_rad = 0;  ///< at the target, between Sun and camera
-
-  SkyView sky;
+  double phase_angle_rad = 0;  ///< at the body, between Sun and camera
 
   Lamp sun;         ///< irradiance 0 in the Earth's shadow
   Lamp earthshine;  ///< irradiance 0 when left out
   /// Earthshine again, as the rung has it: for kHarmonics and kCap a renderer that can uses this
   /// instead of the lamp, which then holds its vector irradiance. Dark for the other rungs.
   EarthLight earth;
+};
+
+/// A body besides the target.
+struct CompanionView : BodyView {
+  Position<BodyFrame> centre;                    ///< in the target's body frame
+  Rotation<BodyFrame, BodyFrame> from_target{};  ///< takes the target's axes to its own
+};
+inline constexpr std::size_t kMostCompanions = 8;
+
+/// One exposure with its geometry resolved, at mid-exposure: the target's view, and all the rest.
+struct Snapshot : BodyView {
+  std::uint64_t sequence = 0;
+  std::uint64_t seed = 0;
+  SimTime shutter_open{};
+  Duration exposure{};
+
+  double range_rate_m_s = 0;
+  double line_of_sight_rate_rad_s = 0;
+
+  SkyView sky;
+
   EarthshineChoice earthshine_rung;
   double background_w_m2_sr = 0;  ///< even over the field
   EarthInFrame earth_in_frame;    ///< seen from the camera; not drawn: not seen
   bool earth_behind = false;      ///< the line of sight meets the Earth beyond the target
   bool roll_is_fallback = false;
+
+  std::array<CompanionView, kMostCompanions> companion{};  ///< the first `companions` of them
+  std::size_t companions = 0;
 };
 
 }  // namespace engine

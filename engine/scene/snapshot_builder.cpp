@@ -16,27 +16,37 @@ Lamp lamp_of(const Eigen::Vector3d& irradiance_w_m2, const Rotation<BodyFrame, J
 
 }  // namespace
 
-PixelPoint SnapshotBuilder::target_image(SimTime t, const CameraAttitude& attitude) const noexcept {
+PixelPoint SnapshotBuilder::image_of(const Propagator& body, SimTime t,
+                                     const CameraAttitude& attitude) const noexcept {
   const Epoch now = spec_.epoch + t.time_since_epoch();
-  const SightLine line = sight_line(camera_, target_, now, spec_.light_path);
+  const SightLine line = sight_line(camera_, body, now, spec_.light_path);
   return spec_.camera.project((attitude.axes * line.apparent).unit).value_or(kNowhere);
 }
 
-Rotation<BodyFrame, J2000> SnapshotBuilder::body_axes(const OrbitState& target) const noexcept {
-  return body_offset(spec_.target_offsets) * orbital_frame(target);
+void SnapshotBuilder::see(const Propagator& body, const SightLine& line, const BodyAxes& axes,
+                          const Shot& shot, BodyView& out) const noexcept {
+  const CameraAttitude& middle = shot.attitude.middle;
+  out.camera = axes * Position<J2000>{line.camera.position.m - line.target.position.m};
+  out.body_from_camera = axes * without_aberration(line) * middle.axes.inverse();
+  out.range_m = line.range_m;
+  out.target_px = spec_.camera.project((middle.axes * line.apparent).unit).value_or(kNowhere);
+  const PixelPoint at_open = image_of(body, shot.shutter_open, shot.attitude.open);
+  const PixelPoint at_close =
+      image_of(body, shot.shutter_open + shot.exposure, shot.attitude.close);
+  out.smear_px = {at_close.u - at_open.u, at_close.v - at_open.v};
 }
 
-void SnapshotBuilder::light_up(const SightLine& line, const Position<J2000>& sun,
-                               Snapshot& out) const noexcept {
+EarthshineChoice SnapshotBuilder::light_up(const SightLine& line, const BodyAxes& axes,
+                                           const Position<J2000>& sun,
+                                           BodyView& out) const noexcept {
   const Eigen::Vector3d to_sun_m = sun.m - line.target.position.m;
   const Direction<J2000> to_sun = direction_of<J2000>(to_sun_m);
   const double irradiance = sun_irradiance_w_m2(spec_.sun, to_sun_m.norm());
-  const Rotation<BodyFrame, J2000> axes = body_axes(line.target);
 
   const bool lit = shadow_margin_m(line.target.position, sun) > 0.0;
   out.sun = {axes * to_sun, lit ? irradiance : 0.0};
   out.phase_angle_rad = angle_between_rad(to_sun.unit, -line.toward_target.unit);
-  light_by_earth(line, sun, axes, out);
+  return light_by_earth(line, axes, sun, out);
 }
 
 template <class Frame>
@@ -54,26 +64,42 @@ EarthDisc<Frame> SnapshotBuilder::earth_from(const Position<J2000>& observer,
   return disc;
 }
 
-void SnapshotBuilder::light_by_earth(const SightLine& line, const Position<J2000>& sun,
-                                     const Rotation<BodyFrame, J2000>& axes,
-                                     Snapshot& out) const noexcept {
+EarthshineChoice SnapshotBuilder::light_by_earth(const SightLine& line, const BodyAxes& axes,
+                                                 const Position<J2000>& sun,
+                                                 BodyView& out) const noexcept {
   const EarthshineModel wanted = spec_.earth.earthshine;
   if (wanted == EarthshineModel::kPaperLamp) {
-    out.earthshine_rung = choose_earthshine(wanted, {}, spec_.earthshine_sensor);
     const double irradiance =
         sun_irradiance_w_m2(spec_.sun, (sun.m - line.target.position.m).norm());
     out.earthshine =
         lamp_of(paper_earth_lamp(line.target.position, spec_.earth.albedo, irradiance), axes);
-    return;
+    return choose_earthshine(wanted, {}, spec_.earthshine_sensor);
   }
   const EarthLight light(earth_from(line.target.position, axes, sun, line.emitted));
-  out.earthshine_rung = choose_earthshine(wanted, light, spec_.earthshine_sensor);
-  const EarthshineModel rung = out.earthshine_rung.model;
-  if (rung == EarthshineModel::kNone) return;
+  const EarthshineChoice choice = choose_earthshine(wanted, light, spec_.earthshine_sensor);
+  if (choice.model == EarthshineModel::kNone) return choice;
   const Eigen::Vector3d& irradiance_w_m2 = light.vector_irradiance_w_m2();
   if (!light.dark())
     out.earthshine = {direction_of<BodyFrame>(irradiance_w_m2), irradiance_w_m2.norm()};
-  if (rung != EarthshineModel::kVector) out.earth = light;
+  if (choice.model != EarthshineModel::kVector) out.earth = light;
+  return choice;
+}
+
+void SnapshotBuilder::add_companions(const SightLine& line, const BodyAxes& axes,
+                                     const Position<J2000>& sun, const Shot& shot,
+                                     Snapshot& out) const noexcept {
+  const SimTime middle = shot.shutter_open + shot.exposure / 2;
+  for (const Companion& companion : companions_) {
+    CompanionView& view = out.companion[out.companions++];
+    const SightLine own = sight_line(camera_, companion.place,
+                                     spec_.epoch + middle.time_since_epoch(), spec_.light_path);
+    const BodyAxes own_axes = companion.axes(own.emitted);
+    see(companion.place, own, own_axes, shot, view);
+    light_up(own, own_axes, sun, view);
+    view.centre = axes * Position<J2000>{companion.place.at(line.emitted).position.m -
+                                         line.target.position.m};
+    view.from_target = own_axes * axes.inverse();
+  }
 }
 
 Snapshot SnapshotBuilder::build(const Shot& shot) const noexcept {
@@ -81,24 +107,16 @@ Snapshot SnapshotBuilder::build(const Shot& shot) const noexcept {
   const SightLine line =
       sight_line(camera_, target_, spec_.epoch + middle.time_since_epoch(), spec_.light_path);
   const Position<J2000> sun = sun_position(spec_.sun.model, line.emitted);
-  const Rotation<BodyFrame, J2000> axes = body_axes(line.target);
+  const BodyAxes axes = body_offset(spec_.target_offsets) * orbital_frame(line.target);
 
   Snapshot out;
   out.sequence = shot.sequence;
   out.seed = spec_.seed;
   out.shutter_open = shot.shutter_open;
   out.exposure = shot.exposure;
-  out.camera = axes * Position<J2000>{line.camera.position.m - line.target.position.m};
-  out.body_from_camera = axes * without_aberration(line) * shot.attitude.middle.axes.inverse();
-  out.range_m = line.range_m;
+  see(target_, line, axes, shot, out);
   out.range_rate_m_s = line.range_rate_m_s;
   out.line_of_sight_rate_rad_s = line.rate_rad_s;
-
-  out.target_px =
-      spec_.camera.project((shot.attitude.middle.axes * line.apparent).unit).value_or(kNowhere);
-  const PixelPoint at_open = target_image(shot.shutter_open, shot.attitude.open);
-  const PixelPoint at_close = target_image(shot.shutter_open + shot.exposure, shot.attitude.close);
-  out.smear_px = {at_close.u - at_open.u, at_close.v - at_open.v};
 
   out.sky = {shot.attitude, line.camera.position, {}};
   if (spec_.light_path == LightPath::kApparent)
@@ -113,7 +131,8 @@ Snapshot SnapshotBuilder::build(const Shot& shot) const noexcept {
     out.earth_in_frame.air = spec_.earth.air;
   }
   out.roll_is_fallback = shot.attitude.middle.roll_is_fallback;
-  light_up(line, sun, out);
+  out.earthshine_rung = light_up(line, axes, sun, out);
+  add_companions(line, axes, sun, shot, out);
   return out;
 }
 

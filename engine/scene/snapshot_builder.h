@@ -1,10 +1,15 @@
 #pragma once
 
+#include <utility>
+#include <vector>
+
+#include "engine/core/contract.h"
 #include "engine/orbit/attitude.h"
 #include "engine/orbit/propagator.h"
 #include "engine/orbit/sight_line.h"
 #include "engine/orbit/sun.h"
 #include "engine/scene/camera_geometry.h"
+#include "engine/scene/companion.h"
 #include "engine/scene/earth.h"
 #include "engine/scene/snapshot.h"
 
@@ -23,30 +28,46 @@ struct SceneSpec {
 };
 
 /// Shot -> Snapshot: orbits, Sun, attitudes and lamps at the exposure's time.
-/// Thread: any. Loop-safe. The propagators outlive it.
+/// Where bodies are to each other is taken at one instant, when the light left the target: light
+/// needs 3 us for a kilometre, and what throws a shadow moves .03 m on meanwhile. Each is seen as
+/// it was when its own light left it. Smear is the target's for all that is in the frame. Thread:
+/// any. Loop-safe. The propagators outlive it.
 class SnapshotBuilder {
  public:
-  SnapshotBuilder(const SceneSpec& spec, const Propagator& camera, const Propagator& target)
-      : spec_(spec), camera_(camera), target_(target) {}
+  /// Pre: at most kMostCompanions.
+  SnapshotBuilder(const SceneSpec& spec, const Propagator& camera, const Propagator& target,
+                  std::vector<Companion> companions = {})
+      : spec_(spec), camera_(camera), target_(target), companions_(std::move(companions)) {
+    ENSURE(companions_.size() <= kMostCompanions);
+  }
 
   [[nodiscard]] Snapshot build(const Shot& shot) const noexcept;
+  [[nodiscard]] std::size_t companions() const noexcept { return companions_.size(); }
 
  private:
-  /// Where the target's centre falls for an attitude at a time.
-  [[nodiscard]] PixelPoint target_image(SimTime t, const CameraAttitude& attitude) const noexcept;
-  [[nodiscard]] Rotation<BodyFrame, J2000> body_axes(const OrbitState& target) const noexcept;
-  void light_up(const SightLine& line, const Position<J2000>& sun, Snapshot& out) const noexcept;
+  using BodyAxes = Rotation<BodyFrame, J2000>;
+
+  /// Where a body's centre falls for an attitude at a time.
+  [[nodiscard]] PixelPoint image_of(const Propagator& body, SimTime t,
+                                    const CameraAttitude& attitude) const noexcept;
+  void see(const Propagator& body, const SightLine& line, const BodyAxes& axes, const Shot& shot,
+           BodyView& out) const noexcept;
+  EarthshineChoice light_up(const SightLine& line, const BodyAxes& axes, const Position<J2000>& sun,
+                            BodyView& out) const noexcept;
+  void add_companions(const SightLine& line, const BodyAxes& axes, const Position<J2000>& sun,
+                      const Shot& shot, Snapshot& out) const noexcept;
   /// What an observer sees whose axes are given; `Frame` is any.
   template <class Frame>
   [[nodiscard]] EarthDisc<Frame> earth_from(const Position<J2000>& observer,
                                             const Rotation<Frame, J2000>& axes,
                                             const Position<J2000>& sun, Epoch now) const noexcept;
-  void light_by_earth(const SightLine& line, const Position<J2000>& sun,
-                      const Rotation<BodyFrame, J2000>& axes, Snapshot& out) const noexcept;
+  EarthshineChoice light_by_earth(const SightLine& line, const BodyAxes& axes,
+                                  const Position<J2000>& sun, BodyView& out) const noexcept;
 
   SceneSpec spec_;
   const Propagator& camera_;
   const Propagator& target_;
+  std::vector<Companion> companions_;
 };
 
 }  // namespace engine

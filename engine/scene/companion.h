@@ -1,0 +1,38 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "engine/core/config_reader.h"
+#include "engine/orbit/attitude.h"
+#include "engine/orbit/held_offset.h"
+#include "engine/orbit/kepler.h"
+#include "engine/scene/snapshot.h"
+
+namespace engine {
+
+/// A body besides the target: companions.<name> of a scenario.
+struct CompanionSpec {
+  std::string name;
+  std::string mesh = "telescope";
+  std::string mesh_where;               ///< the place in the scenario that names it
+  std::optional<KeplerElements> orbit;  ///< none: it is held beside the target
+  OrbitalOffset offset;                 ///< where it has no orbit of its own
+  EulerOffsets attitude;  ///< from its own orbital frame, or the target's where it is held
+};
+/// Reads companions.<name> for each name below `companions`, kMostCompanions at most.
+[[nodiscard]] std::vector<CompanionSpec> read_companions(const ConfigReader& config);
+
+/// A companion as it moves. The propagators outlive it.
+struct Companion {
+  const Propagator& place;
+  const Propagator& upright;  ///< whose orbital frame its attitude is counted from
+  EulerOffsets attitude;
+
+  [[nodiscard]] Rotation<BodyFrame, J2000> axes(Epoch t) const noexcept {
+    return body_offset(attitude) * orbital_frame(upright.at(t));
+  }
+};
+
+}  // namespace engine
