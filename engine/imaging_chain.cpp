@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace engine {
 namespace {
@@ -30,6 +31,20 @@ void add_run(const PixelRect& run, FrameTruth& truth, TruthMask& mask) noexcept 
                                 std::max(box.right, run.right), run.bottom};
 }
 
+void tell_companions(const Snapshot& snapshot, const RenderReport& render,
+                     FrameTruth& truth) noexcept {
+  truth.companions = snapshot.companions;
+  for (std::size_t i = 0; i < snapshot.companions; ++i) {
+    const CompanionView& view = snapshot.companion[i];
+    truth.companion[i] = {.range_m = view.range_m,
+                          .phase_angle_rad = view.phase_angle_rad,
+                          .target_px = view.target_px,
+                          .smear_px = std::hypot(view.smear_px.u, view.smear_px.v),
+                          .visible_fraction = render.visible_fraction_of_companion[i],
+                          .sun_irradiance_w_m2 = view.sun.irradiance_w_m2};
+  }
+}
+
 }  // namespace
 
 ImagingChain::ImagingChain(const SnapshotBuilder& scene, std::unique_ptr<Renderer> renderer,
@@ -50,6 +65,12 @@ ImagingChain::ImagingChain(const SnapshotBuilder& scene, std::unique_ptr<Rendere
   const PixelRect most = camera.frame().grown_by(wish.beyond_frame_px);
   radiance_.grid.reserve(most.width() * wish.oversampling, most.height() * wish.oversampling);
   radiance_.cover.reserve(most.width() * wish.oversampling, most.height() * wish.oversampling);
+  if (scene_.companions() > 0) {
+    radiance_.targets_grid.reserve(most.width() * wish.oversampling,
+                                   most.height() * wish.oversampling);
+    radiance_.targets_cover.reserve(most.width() * wish.oversampling,
+                                    most.height() * wish.oversampling);
+  }
   radiance_.earth.reserve(camera, wish.beyond_frame_px);
 }
 
@@ -62,8 +83,10 @@ FrameReport ImagingChain::expose(const Shot& shot, Budget budget, DnImage& out,
   radiance_.earth.draw(snapshot.earth_in_frame, snapshot.background_w_m2_sr);
   report.render = renderer_->render(snapshot, budget, radiance_);
   const Duration rendered = now();
+  const bool mixed = radiance_.targets_grid.width() > 0;
+  if (mixed) measure_past_companions(shot.exposure, report.truth, mask);
   report.optics = optics_.project(radiance_, irradiance_);
-  measure_light(report.optics.window, shot.exposure, report.truth, mask);
+  if (!mixed) measure_light(report.optics.window, shot.exposure, report.truth, mask);
   // What was measured is the target's light: the stars come after.
   if (stars_ != nullptr)
     report.stars = stars_->add(snapshot, radiance_,
@@ -85,9 +108,21 @@ FrameReport ImagingChain::expose(const Shot& shot, Budget budget, DnImage& out,
   truth.earthshine_w_m2 = snapshot.earthshine.irradiance_w_m2;
   truth.earth_behind = snapshot.earth_behind;
   truth.roll_is_fallback = snapshot.roll_is_fallback;
+  tell_companions(snapshot, report.render, truth);
   const auto pixels = out.pixels();
   report.peak_dn = *std::max_element(pixels.begin(), pixels.end());
   return report;
+}
+
+void ImagingChain::measure_past_companions(Duration exposure, FrameTruth& truth,
+                                           TruthMask& mask) noexcept {
+  const auto exchange = [this] {
+    std::swap(radiance_.grid, radiance_.targets_grid);
+    std::swap(radiance_.cover, radiance_.targets_cover);
+  };
+  exchange();
+  measure_light(optics_.project(radiance_, irradiance_).window, exposure, truth, mask);
+  exchange();
 }
 
 void ImagingChain::measure_light(const PixelRect& window, Duration exposure, FrameTruth& truth,

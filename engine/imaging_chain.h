@@ -28,6 +28,8 @@ class ImagingChain final : public SceneGenerator {
   [[nodiscard]] Duration now() const noexcept {
     return stopwatch_ != nullptr ? stopwatch_() : Duration{};
   }
+  /// Blurs the target alone, and measures it.
+  void measure_past_companions(Duration exposure, FrameTruth& truth, TruthMask& mask) noexcept;
   /// What is known of the target's light once it has been blurred: truth from peak_e to
   /// signal_to_noise, and the photocentre.
   void measure_light(const PixelRect& window, Duration exposure, FrameTruth& truth,

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <span>
@@ -13,7 +14,19 @@
 
 namespace engine {
 
-/// What a frame really shows, before noise. The software under test never sees it.
+/// Of a body besides the target, as FrameTruth has it of the target. What hides it, or shades it,
+/// is not in these numbers.
+struct CompanionTruth {
+  double range_m = 0;
+  double phase_angle_rad = 0;
+  PixelPoint target_px;         ///< the image of its centre, in or out of the frame
+  double smear_px = 0;          ///< its own; the frame has the target's for all
+  double visible_fraction = 0;  ///< of its image, in the frame, hidden or not
+  double sun_irradiance_w_m2 = 0;
+};
+
+/// What a frame really shows, before noise. The software under test never sees it. With companions
+/// in sight the light of the target is what of it is seen past them, its mask too.
 struct FrameTruth {
   double range_m = 0;
   double range_rate_m_s = 0;
@@ -36,6 +49,8 @@ struct FrameTruth {
   double earthshine_w_m2 = 0;
   bool earth_behind = false;
   bool roll_is_fallback = false;
+  std::array<CompanionTruth, kMostCompanions> companion{};  ///< the first `companions` of them
+  std::size_t companions = 0;
 };
 
 /// The pixels where the target's light, free of noise, is above one sigma of the noise of a pixel

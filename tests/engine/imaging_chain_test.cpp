@@ -26,7 +26,7 @@ class Rig {
  public:
   explicit Rig(int threads, const Mesh& mesh = telescope_mesh(),
                const std::vector<Material>& materials = test_support::telescope_materials(),
-               bool earth_in_frame = false)
+               bool earth_in_frame = false, std::vector<OrbitalOffset> companions = {})
       : pool_(threads) {
     SceneSpec scene;
     scene.epoch = flyby.epoch;
@@ -42,10 +42,16 @@ class Rig {
     RenderSpec render;
     render.camera = scene.camera;
     render.grid = optics.wish();
-    auto renderer = make_renderer(render, std::make_shared<TracedTarget>(mesh, materials), pool_);
-    chain_ = std::make_unique<ImagingChain>(SnapshotBuilder(scene, flyby.camera, flyby.target),
-                                            std::move(renderer), std::move(optics),
-                                            Detector(detector, pool_), detector, scene.camera);
+    const auto target = std::make_shared<TracedTarget>(mesh, materials);
+    std::vector<Companion> moving;
+    for (const OrbitalOffset& offset : companions) {
+      places_.push_back(std::make_unique<HeldOffset>(flyby.target, offset));
+      moving.push_back({*places_.back(), flyby.target, {}});
+    }
+    auto renderer = make_renderer(render, target, pool_, {companions.size(), target});
+    chain_ = std::make_unique<ImagingChain>(
+        SnapshotBuilder(scene, flyby.camera, flyby.target, std::move(moving)), std::move(renderer),
+        std::move(optics), Detector(detector, pool_), detector, scene.camera);
   }
 
   /// 1 ms, the target's apparent place `off_px` to the left of the boresight's, tracked.
@@ -76,6 +82,7 @@ class Rig {
 
  private:
   WorkerPool pool_;
+  std::vector<std::unique_ptr<HeldOffset>> places_;
   std::unique_ptr<ImagingChain> chain_;
   TruthMask mask_{1024};
 };
@@ -165,6 +172,47 @@ TEST(ImagingChain, PhotocentreOfABallUnderTheSunFollowsItsPlace) {
             10.0);
   EXPECT_NEAR(moved.truth.photocentre_px.u - centred.truth.photocentre_px.u, -40.0, 0.05);
   EXPECT_NEAR(moved.truth.photocentre_px.v - centred.truth.photocentre_px.v, 0.0, 0.05);
+}
+
+TEST(ImagingChain, ACompanionBesideTheTargetDoesNotChangeItsTruth) {
+  const Mesh ball = test_support::sphere(1.0F, 24, 48, "white");
+  const std::vector<Material> white{test_support::lambert_material("white", 0.3)};
+  for (const bool earth : {false, true}) {
+    Rig alone(1, ball, white, earth);
+    // 6 m to a side and 5 m up: some 60 pixels away, out of each other's light.
+    Rig both(1, ball, white, earth, {{5.0, 0.0, 6.0}});
+    DnImage image;
+    DnImage with;
+    const FrameTruth want = alone.expose(alone.shot(kClosestOfPass3_s), image).truth;
+    const FrameTruth truth = both.expose(both.shot(kClosestOfPass3_s), with).truth;
+    // The same light on a larger grid: a transform's rounding.
+    EXPECT_NEAR(truth.photocentre_px.u, want.photocentre_px.u, 1e-3);
+    EXPECT_NEAR(truth.photocentre_px.v, want.photocentre_px.v, 1e-3);
+    EXPECT_NEAR(truth.peak_e / want.peak_e, 1.0, 1e-4);
+    EXPECT_NEAR(truth.mask_px, want.mask_px, 2);
+    EXPECT_EQ(truth.box.left, want.box.left);
+    EXPECT_EQ(truth.box.bottom, want.box.bottom);
+    EXPECT_NEAR(truth.signal_to_noise / want.signal_to_noise, 1.0, 1e-3);
+    // And the other ball is where the truth says it is.
+    ASSERT_EQ(truth.companions, 1U);
+    const CompanionTruth& other = truth.companion[0];
+    EXPECT_GT(
+        std::hypot(other.target_px.u - truth.target_px.u, other.target_px.v - truth.target_px.v),
+        30.0);
+    EXPECT_NEAR(other.range_m, truth.range_m, 10.0);
+    EXPECT_EQ(other.visible_fraction, 1.0);
+    const auto dn = [](const DnImage& i, const PixelPoint& p) {
+      int brightest = 0;
+      for (int v = -4; v <= 4; ++v)
+        for (int u = -4; u <= 4; ++u)
+          brightest = std::max(brightest, static_cast<int>(i.at(static_cast<int>(p.u) + u,
+                                                                static_cast<int>(p.v) + v)));
+      return brightest;
+    };
+    if (earth) continue;
+    EXPECT_GT(dn(with, other.target_px), 50);
+    EXPECT_LT(dn(image, other.target_px), 5);
+  }
 }
 
 TEST(ImagingChain, TruthIsThatOfTheSnapshot) {

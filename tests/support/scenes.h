@@ -130,4 +130,20 @@ inline void add_plate(engine::Mesh& mesh, const std::string& material,
   return view_from(place, -place, up);
 }
 
+/// One body more, at `centre` in the target's body frame and turned by `turn`, in the same light.
+inline engine::CompanionView& add_companion(
+    engine::Snapshot& snapshot, const Eigen::Vector3d& centre,
+    const Eigen::Matrix3d& turn = Eigen::Matrix3d::Identity()) {
+  engine::CompanionView& view = snapshot.companion[snapshot.companions++];
+  view.centre.m = centre;
+  view.from_target.matrix = turn;
+  view.camera.m = turn * (snapshot.camera.m - centre);
+  view.range_m = view.camera.m.norm();
+  view.body_from_camera.matrix = turn * snapshot.body_from_camera.matrix;
+  view.sun = {view.from_target * snapshot.sun.toward, snapshot.sun.irradiance_w_m2};
+  view.earthshine = {view.from_target * snapshot.earthshine.toward,
+                     snapshot.earthshine.irradiance_w_m2};
+  return view;
+}
+
 }  // namespace test_support

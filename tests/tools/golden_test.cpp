@@ -21,6 +21,7 @@ const fs::path kGolden = STARLOOP_SOURCE_DIR "/tests/golden";
 
 struct Picture {
   std::string name;
+  std::string scenario = "config/flyby.toml";
   std::vector<std::string> arguments;
 };
 
@@ -32,19 +33,26 @@ std::vector<Picture> pictures() {
     std::istringstream words(line);
     Picture picture;
     words >> picture.name;
-    for (std::string word; words >> word;) picture.arguments.push_back(word);
+    for (std::string word; words >> word;) {
+      if (word.ends_with(".toml")) {
+        picture.scenario = word;
+      } else {
+        picture.arguments.push_back(word);
+      }
+    }
     all.push_back(picture);
   }
   return all;
 }
 
 TEST(Golden, EveryPictureIsRenderedAgain) {
-  ASSERT_EQ(pictures().size(), 4u);
+  ASSERT_EQ(pictures().size(), 5u);
   for (const Picture& picture : pictures()) {
     SCOPED_TRACE(picture.name);
     const program::TemporaryFolder folder;
-    std::vector<std::string> call = {"render", STARLOOP_SOURCE_DIR "/config/flyby.toml", "--quiet",
-                                     "--out", (folder.path() / "frame.fits").string()};
+    std::vector<std::string> call = {"render",
+                                     (fs::path(STARLOOP_SOURCE_DIR) / picture.scenario).string(),
+                                     "--quiet", "--out", (folder.path() / "frame.fits").string()};
     call.insert(call.end(), picture.arguments.begin(), picture.arguments.end());
     const program::Outcome run = program::starloop(call);
     ASSERT_EQ(run.exit_code, 0) << run.err;

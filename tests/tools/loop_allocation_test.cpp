@@ -20,7 +20,9 @@ namespace {
 using engine::Duration;
 
 /// The paper's pass through a camera of 128 x 128 coarse pixels, the whole telescope in view.
-starloop::Scenario small_scenario(const std::string& method) {
+starloop::Scenario small_scenario(const std::string& what) {
+  const bool companions = what == "companions";
+  const std::string method = companions ? "paths" : what;
   starloop::CommonOptions options;
   options.file = STARLOOP_SOURCE_DIR "/config/flyby.toml";
   options.overrides = {"camera.width_px=128",
@@ -41,6 +43,10 @@ starloop::Scenario small_scenario(const std::string& method) {
                        "sensors.star_tracker_across_arcsec=1",
                        "sensors.gyro_noise_deg_rt_h=0.01",
                        "stars.catalogue=built-in"};
+  if (companions) {
+    options.overrides.insert(options.overrides.end(),
+                             {"companions.a.along_m=12", "companions.b.cross_m=-15"});
+  }
   return starloop::load_scenario(options);
 }
 
@@ -183,6 +189,7 @@ TEST_P(LoopAllocation, FiveHundredFramesTakeNoMoreFromTheHeapThanTen) {
   EXPECT_EQ(few.allocations, many.allocations);
 }
 
-INSTANTIATE_TEST_SUITE_P(Methods, LoopAllocation, testing::Values("paths", "lattice"));
+INSTANTIATE_TEST_SUITE_P(Methods, LoopAllocation,
+                         testing::Values("paths", "lattice", "companions"));
 
 }  // namespace

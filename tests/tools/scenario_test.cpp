@@ -378,4 +378,44 @@ TEST(Scenario, CloseUpsCameraCirclesItsTargetAtOneDistance) {
   }
 }
 
+TEST(Scenario, FormationsCourierPassesThroughTheLineOfSightAndThenTheSunlight) {
+  CommonOptions options;
+  options.file = STARLOOP_SOURCE_DIR "/config/formation.toml";
+  const Scenario scenario = starloop::load_scenario(options);
+  ASSERT_EQ(starloop::companion_names(scenario), (std::vector<std::string>{"courier", "escort"}));
+  const engine::Epoch epoch = scenario.scene.epoch;
+  const engine::KeplerPropagator camera(scenario.camera_orbit, epoch);
+  const engine::KeplerPropagator target(scenario.target_orbit, epoch);
+  const engine::KeplerPropagator courier(scenario.companions[0].orbit.value(), epoch);
+  EXPECT_LT(starloop::chosen_pass(scenario).start, engine::sim_time(80.0));
+  // How far it is from a line that leaves the target towards somewhere.
+  const auto beside_m = [&](double t_s, bool sun) {
+    const engine::Epoch t = epoch + engine::from_seconds(t_s);
+    const Eigen::Vector3d from = target.at(t).position.m;
+    const Eigen::Vector3d to =
+        sun ? engine::sun_position(scenario.scene.sun.model, t).m : camera.at(t).position.m;
+    const Eigen::Vector3d along = (to - from).normalized();
+    const Eigen::Vector3d place = courier.at(t).position.m - from;
+    EXPECT_GT(place.dot(along), 30.0);
+    return place.cross(along).norm();
+  };
+  EXPECT_LT(beside_m(105.0, false), 1.5);
+  EXPECT_GT(beside_m(105.0, true), 8.0);
+  EXPECT_LT(beside_m(135.0, true), 1.5);
+  EXPECT_GT(beside_m(135.0, false), 8.0);
+}
+
+TEST(Scenario, CompanionsWantTheRendererThatKnowsThem) {
+  const std::string text = flyby_text() + "\n[companions.a]\nalong_m = 9\n";
+  const auto load_text = [](const std::string& t) {
+    static_cast<void>(starloop::read_scenario(ConfigReader::from_text(t, "x.toml")));
+  };
+  EXPECT_FALSE(complaint([&] { load_text(text); }).has_value());
+  const int line = line_of(text, "render", "method");
+  const auto said = complaint([&] { load_text(with_line(text, line, "method = \"lattice\"")); });
+  ASSERT_TRUE(said.has_value());
+  EXPECT_EQ(*said, "x.toml:" + std::to_string(line) +
+                       ": render.method must be \"paths\" where there are companions");
+}
+
 }  // namespace

@@ -82,6 +82,13 @@ int render_frame(const CommonOptions& options, const RenderOptions& render) {
                 fits.string().c_str(), png.c_str(), t.range_m * 1e-3,
                 t.phase_angle_rad / engine::kDegree, t.peak_e, report.peak_dn,
                 t.sun_irradiance_w_m2 > 0.0 ? "" : ", in the Earth's shadow");
+    for (std::size_t i = 0; i < t.companions; ++i) {
+      const engine::CompanionTruth& c = t.companion[i];
+      std::printf("%s: range %.3f km, centre at (%.2f, %.2f), %.0f %% in the frame%s\n",
+                  scenario.companions[i].name.c_str(), c.range_m * 1e-3, c.target_px.u,
+                  c.target_px.v, 100.0 * c.visible_fraction,
+                  c.sun_irradiance_w_m2 > 0.0 ? "" : ", in the Earth's shadow");
+    }
     const engine::NoiseReached& noise = report.render.rho_mc;
     if (std::isfinite(noise.rms))
       std::printf("rendering noise %.3f of the sensor's over %d lit pixels, at worst %.2f\n",

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <map>
 #include <thread>
 
 #include "engine/core/constants.h"
@@ -103,19 +104,34 @@ std::optional<engine::CameraAttitude> read_boresight(const ConfigTable& table) {
   return attitude;
 }
 
-engine::Mesh load_mesh(const Scenario& scenario) {
-  if (scenario.mesh == "telescope") return engine::telescope_mesh();
+engine::Mesh load_mesh(const std::string& name) {
+  if (name == "telescope") return engine::telescope_mesh();
   engine::MeshReport report;
-  engine::Mesh mesh;
-  try {
-    mesh = engine::load_obj(scenario.mesh, report);
-  } catch (const engine::ConfigError& e) {
-    throw engine::ConfigError(scenario.mesh_where + ": " + e.what());
-  }
+  engine::Mesh mesh = engine::load_obj(name, report);
   if (report.left_out() > 0)
-    std::fprintf(stderr, "%s: %zu faces left out: %zu not finite, %zu without area\n",
-                 scenario.mesh.c_str(), report.left_out(), report.not_finite, report.zero_area);
+    std::fprintf(stderr, "%s: %zu faces left out: %zu not finite, %zu without area\n", name.c_str(),
+                 report.left_out(), report.not_finite, report.zero_area);
   return mesh;
+}
+
+/// The target's first. Bodies of one mesh share it.
+std::vector<std::shared_ptr<engine::TracedTarget>> traced_bodies(const Scenario& scenario) {
+  std::map<std::string, std::shared_ptr<engine::TracedTarget>> by_mesh;
+  std::vector<std::shared_ptr<engine::TracedTarget>> bodies;
+  const auto add = [&](const std::string& mesh, const std::string& where) {
+    std::shared_ptr<engine::TracedTarget>& shape = by_mesh[mesh];
+    try {
+      if (shape == nullptr)
+        shape = std::make_shared<engine::TracedTarget>(load_mesh(mesh), scenario.materials);
+    } catch (const engine::ConfigError& e) {
+      throw engine::ConfigError(where + ": " + e.what());
+    }
+    bodies.push_back(shape);
+  };
+  add(scenario.mesh, scenario.mesh_where);
+  for (const engine::CompanionSpec& companion : scenario.companions)
+    add(companion.mesh, companion.mesh_where);
+  return bodies;
 }
 
 std::string text_of(const engine::StarCatalogue& stars, const engine::CameraGeometry& camera) {
@@ -189,10 +205,13 @@ Scenario read_scenario(const ConfigReader& config) {
 
   s.mesh = config.table("target").text_or("mesh", "telescope");
   s.mesh_where = config.table("target").where("mesh");
+  s.companions = engine::read_companions(config);
   s.materials = engine::read_materials(config);
   s.optics = engine::read_optics(config.table("optics"), s.scene.camera);
   s.render = engine::read_render(config.table("render"));
   s.render.camera = s.scene.camera;
+  if (!s.companions.empty() && s.render.method != engine::RenderMethod::kPaths)
+    config.table("render").fail("method", "must be \"paths\" where there are companions");
   s.detector = engine::read_detector(config.table("detector"), s.scene.camera.pixel_pitch_m,
                                      s.scene.sun.mean_wavelength_m);
   s.guidance = hil::read_guidance_error(config.table("guidance"));
@@ -218,6 +237,12 @@ Scenario read_scenario(const ConfigReader& config) {
   s.tracker = read_tracker(config.table("tracker"), s.scene.camera);
   config.reject_unknown_keys();
   return s;
+}
+
+std::vector<std::string> companion_names(const Scenario& scenario) {
+  std::vector<std::string> names;
+  for (const engine::CompanionSpec& spec : scenario.companions) names.push_back(spec.name);
+  return names;
 }
 
 ScenarioSource read_source(const CommonOptions& options) {
@@ -261,14 +286,8 @@ Rig::Rig(const Scenario& scenario, int threads)
   render.clock = &hil::SteadyClock::stopwatch;
   engine::SceneSpec scene = scenario.scene;
   scene.earthshine_sensor = earthshine_sensor(render.noise, scenario.materials);
-  engine::Mesh mesh = load_mesh(scenario);
-  triangles_ = mesh.triangles.size();
-  std::shared_ptr<engine::TracedTarget> target;
-  try {
-    target = std::make_shared<engine::TracedTarget>(std::move(mesh), scenario.materials);
-  } catch (const engine::ConfigError& e) {
-    throw engine::ConfigError(scenario.mesh_where + ": " + e.what());
-  }
+  const auto bodies = traced_bodies(scenario);
+  for (const auto& body : bodies) triangles_ += body->mesh.triangles.size();
   std::unique_ptr<engine::Starlight> stars;
   if (scenario.stars.source != engine::StarSpec::Source::kNone) {
     const engine::StarCatalogue catalogue =
@@ -280,10 +299,25 @@ Rig::Rig(const Scenario& scenario, int threads)
         engine::PointSplat(scenario.optics, faint_w_m2, pool_), detector);
   }
   generator_ = std::make_unique<engine::ImagingChain>(
-      engine::SnapshotBuilder(scene, camera_, target_),
-      engine::make_renderer(render, std::move(target), pool_), std::move(optics),
-      engine::Detector(detector, pool_), detector, scenario.scene.camera,
+      engine::SnapshotBuilder(scene, camera_, target_, move_companions(scenario)),
+      engine::make_renderer(render, bodies.front(), pool_, {bodies.begin() + 1, bodies.end()}),
+      std::move(optics), engine::Detector(detector, pool_), detector, scenario.scene.camera,
       &hil::SteadyClock::stopwatch, std::move(stars));
+}
+
+std::vector<engine::Companion> Rig::move_companions(const Scenario& scenario) {
+  std::vector<engine::Companion> moving;
+  for (const engine::CompanionSpec& spec : scenario.companions) {
+    if (spec.orbit) {
+      companions_.push_back(std::make_unique<engine::KeplerPropagator>(*spec.orbit, epoch_));
+    } else {
+      companions_.push_back(std::make_unique<engine::HeldOffset>(target_, spec.offset));
+    }
+    const engine::Propagator& place = *companions_.back();
+    const engine::Propagator& upright = spec.orbit ? place : target_;
+    moving.push_back({place, upright, spec.attitude});
+  }
+  return moving;
 }
 
 hil::ScriptedPointing Rig::prediction() const {

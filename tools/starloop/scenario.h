@@ -69,6 +69,7 @@ struct Scenario {
   engine::SceneSpec scene;
   std::string mesh;
   std::string mesh_where;  ///< the place in the scenario that names it
+  std::vector<engine::CompanionSpec> companions;
   std::vector<engine::Material> materials;
   engine::RenderSpec render;
   engine::OpticsSpec optics;
@@ -111,6 +112,8 @@ struct ScenarioSource {
 [[nodiscard]] Scenario load_scenario(const ScenarioSource& source);
 [[nodiscard]] Scenario load_scenario(const CommonOptions& options);
 [[nodiscard]] Scenario read_scenario(const engine::ConfigReader& config);
+/// In the order that frames have them in.
+[[nodiscard]] std::vector<std::string> companion_names(const Scenario& scenario);
 
 /// Everything that is built from a scenario once, before the first shutter opens.
 class Rig {
@@ -125,17 +128,21 @@ class Rig {
   [[nodiscard]] const engine::KeplerPropagator& camera() const noexcept { return camera_; }
   [[nodiscard]] const engine::KeplerPropagator& target() const noexcept { return target_; }
   [[nodiscard]] int threads() const noexcept { return pool_.threads(); }
+  /// Of the target and all companions.
   [[nodiscard]] std::size_t triangles() const noexcept { return triangles_; }
   /// A line about the catalogue of stars; empty when there is none.
   [[nodiscard]] const std::string& star_text() const noexcept { return star_text_; }
 
  private:
+  [[nodiscard]] std::vector<engine::Companion> move_companions(const Scenario& scenario);
+
   engine::Epoch epoch_;
   engine::LightPath path_;
   hil::RollRule roll_;
   std::optional<engine::CameraAttitude> boresight_;
   engine::KeplerPropagator camera_;
   engine::KeplerPropagator target_;
+  std::vector<std::unique_ptr<engine::Propagator>> companions_;
   hil::BelievedTarget believed_target_;
   engine::WorkerPool pool_;
   std::size_t triangles_ = 0;

@@ -50,6 +50,9 @@ void weigh(const std::vector<SoakRound>& earlier, SoakRound& round) {
 
 std::uint64_t not_finite(const hil::FrameRecord& r) {
   const engine::FrameTruth& t = r.report.truth;
+  for (std::size_t i = 0; i < t.companions; ++i)
+    if (!std::isfinite(t.companion[i].range_m) || !std::isfinite(t.companion[i].target_px.u))
+      return r.report.render.rejected_rays + 1U;
   // The photocentre is not a number where there is no light: that is its way of saying so.
   const bool good = std::isfinite(t.range_m) && std::isfinite(t.target_px.u) &&
                     std::isfinite(t.target_px.v) && std::isfinite(t.smear_px) &&

@@ -48,6 +48,21 @@ Json stars_of(const engine::StarReport& stars) {
           {"brightest", std::move(brightest)}};
 }
 
+/// By name.
+Json companions_of(const engine::FrameTruth& truth, const std::vector<std::string>& names) {
+  Json all = Json::object();
+  for (std::size_t i = 0; i < std::min(truth.companions, names.size()); ++i) {
+    const engine::CompanionTruth& c = truth.companion[i];
+    all[names[i]] = {{"range_m", c.range_m},
+                     {"phase_angle_rad", c.phase_angle_rad},
+                     {"target_px", place(c.target_px)},
+                     {"smear_px", c.smear_px},
+                     {"visible_fraction", c.visible_fraction},
+                     {"sun_irradiance_w_m2", c.sun_irradiance_w_m2}};
+  }
+  return all;
+}
+
 Json truth_of(const hil::FrameRecord& record) {
   const engine::FrameTruth& t = record.report.truth;
   const hil::MeasuredAttitude& m = record.measured;
@@ -114,7 +129,7 @@ TruthRecorder::TruthRecorder(const Spec& spec)
        {{"description",
          "What starloop's frames really show. Pixel (0, 0) reaches from 0 to 1; segmentation: "
          "where the target's light, free of noise, is above one sigma of a dark pixel's "
-         "noise"}}},
+         "noise; companions have no annotations"}}},
       {"categories", Json::array({{{"id", 1}, {"name", "target"}}})},
       {"images", Json::array()},
       {"annotations", Json::array()}};
@@ -214,6 +229,8 @@ bool TruthRecorder::write_next(bool all_is_in) {
 
 void TruthRecorder::write_line(const hil::FrameRecord& record, const TruthMask* mask) {
   Json line = truth_of(record);
+  if (!spec_.companions.empty())
+    line["companions"] = companions_of(record.report.truth, spec_.companions);
   line["mask"] = mask != nullptr ? runs_of(*mask) : Json(nullptr);
   file_ << line.dump() << '\n';
   ++lines_;

@@ -66,6 +66,7 @@ std::vector<std::string> left_out(const Scenario& s) {
     list.emplace_back("the Sun's disc");
   else if (hard)
     list.emplace_back("the Sun's disc in shadows");
+  if (!s.companions.empty()) list.emplace_back("companions' smear: the frame has the target's");
   return list;
 }
 
