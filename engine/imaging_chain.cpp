@@ -83,7 +83,7 @@ FrameReport ImagingChain::expose(const Shot& shot, Budget budget, DnImage& out,
   radiance_.earth.draw(snapshot.earth_in_frame, snapshot.background_w_m2_sr);
   report.render = renderer_->render(snapshot, budget, radiance_);
   const Duration rendered = now();
-  const bool mixed = radiance_.targets_grid.width() > 0;
+  const bool mixed = radiance_.companions_in_sight;
   if (mixed) measure_past_companions(shot.exposure, report.truth, mask);
   report.optics = optics_.project(radiance_, irradiance_);
   if (!mixed) measure_light(report.optics.window, shot.exposure, report.truth, mask);
@@ -117,6 +117,7 @@ FrameReport ImagingChain::expose(const Shot& shot, Budget budget, DnImage& out,
 void ImagingChain::measure_past_companions(Duration exposure, FrameTruth& truth,
                                            TruthMask& mask) noexcept {
   const auto exchange = [this] {
+    std::swap(radiance_.region, radiance_.targets_region);
     std::swap(radiance_.grid, radiance_.targets_grid);
     std::swap(radiance_.cover, radiance_.targets_cover);
   };

@@ -111,9 +111,12 @@ void PathTracer::size_images(Radiance& out) const noexcept {
   const int s = out.oversampling = spec_.grid.oversampling;
   out.grid.resize(out.region.width() * s, out.region.height() * s);
   out.cover.resize(out.grid.width(), out.grid.height());
-  const bool mixed = std::any_of(frames_.begin() + 1, frames_.end(),
-                                 [](const TracedFrame& frame) { return !frame.seen.empty(); });
-  out.targets_grid.resize(mixed ? out.grid.width() : 0, mixed ? out.grid.height() : 0);
+  out.companions_in_sight =
+      std::any_of(frames_.begin() + 1, frames_.end(),
+                  [](const TracedFrame& frame) { return !frame.seen.empty(); });
+  out.targets_region = out.companions_in_sight ? frames_[0].seen : PixelRect{};
+  if (out.targets_region.empty()) out.targets_region = {};
+  out.targets_grid.resize(out.targets_region.width() * s, out.targets_region.height() * s);
   out.targets_cover.resize(out.targets_grid.width(), out.targets_grid.height());
 }
 
@@ -284,7 +287,8 @@ void PathTracer::trace_row(const Snapshot& snapshot, const Pass& pass, Radiance&
   for (int u = span.begin; u < span.end; ++u) {
     if (!footprint_.marked(u, v)) continue;
     take_pixel(tracer, pass, out, u - span.begin, u - region.left, row);
-    if (out.targets_grid.width() > 0)
+    const PixelRect& targets = out.targets_region;
+    if (u >= targets.left && u < targets.right && v >= targets.top && v < targets.bottom)
       take_targets_part(tracer, pass, out, u - span.begin, u - region.left, row);
   }
   count(tracer, row);
@@ -296,9 +300,10 @@ void PathTracer::clear_row(Radiance& out, int row) noexcept {
   for (int line = row * out.oversampling; line < (row + 1) * out.oversampling; ++line) {
     std::ranges::fill(out.grid.row(line), 0.0F);
     std::ranges::fill(out.cover.row(line), 0.0F);
-    if (out.targets_grid.width() == 0) continue;
-    std::ranges::fill(out.targets_grid.row(line), 0.0F);
-    std::ranges::fill(out.targets_cover.row(line), 0.0F);
+    const int targets_line = line - (out.targets_region.top - out.region.top) * out.oversampling;
+    if (targets_line < 0 || targets_line >= out.targets_grid.height()) continue;
+    std::ranges::fill(out.targets_grid.row(targets_line), 0.0F);
+    std::ranges::fill(out.targets_cover.row(targets_line), 0.0F);
   }
   std::fill_n(replicates_.begin() + to_offset(pixel(out.region, 0, row)), out.region.width(),
               std::array<float, kReplicates>{});
@@ -337,9 +342,11 @@ void PathTracer::take_targets_part(const RowTracer& tracer, const Pass& pass, Ra
   if (pass.from > 0 && to <= pass.from) return;
   const double old_share = static_cast<double>(pass.from) / to;
   const double samples = 1.0 * replicates_used_ * to;
+  const int left = (out.region.left + column - out.targets_region.left) * side;
+  const int top = (out.region.top + row - out.targets_region.top) * side;
   for (int cell = 0; cell < side * side; ++cell) {
-    const int x = column * side + cell % side;
-    const int y = row * side + cell / side;
+    const int x = left + cell % side;
+    const int y = top + cell / side;
     double light = 0;
     for (int r = 0; r < replicates_used_; ++r) light += tracer.targets_light(traced, cell, r);
     mix_in(old_share, light / samples, out.targets_grid.at(x, y));

@@ -25,7 +25,10 @@ struct Radiance {
   int oversampling = 3;
   RadianceImage grid;
   CoverImage cover;  ///< of the same cells: what lies behind them shows through the rest
-  /// What of the grid and of the cover is the target's own; empty where no companion is in sight.
+  /// With companions in sight: what of the grid and of the cover is the target's own, where that
+  /// can be.
+  bool companions_in_sight = false;
+  PixelRect targets_region;
   RadianceImage targets_grid;
   CoverImage targets_cover;
   std::vector<PointSource> points;  ///< inside the region

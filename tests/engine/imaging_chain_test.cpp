@@ -176,19 +176,19 @@ TEST(ImagingChain, PhotocentreOfABallUnderTheSunFollowsItsPlace) {
 
 TEST(ImagingChain, ACompanionBesideTheTargetDoesNotChangeItsTruth) {
   const Mesh ball = test_support::sphere(1.0F, 24, 48, "white");
-  const std::vector<Material> white{test_support::lambert_material("white", 0.3)};
+  const std::vector<Material> dark{test_support::lambert_material("white", 0.03)};
   for (const bool earth : {false, true}) {
-    Rig alone(1, ball, white, earth);
+    Rig alone(1, ball, dark, earth);
     // 6 m to a side and 5 m up: some 60 pixels away, out of each other's light.
-    Rig both(1, ball, white, earth, {{5.0, 0.0, 6.0}});
+    Rig both(1, ball, dark, earth, {{5.0, 0.0, 6.0}});
     DnImage image;
     DnImage with;
     const FrameTruth want = alone.expose(alone.shot(kClosestOfPass3_s), image).truth;
     const FrameTruth truth = both.expose(both.shot(kClosestOfPass3_s), with).truth;
-    // The same light on a larger grid: a transform's rounding.
-    EXPECT_NEAR(truth.photocentre_px.u, want.photocentre_px.u, 1e-3);
-    EXPECT_NEAR(truth.photocentre_px.v, want.photocentre_px.v, 1e-3);
-    EXPECT_NEAR(truth.peak_e / want.peak_e, 1.0, 1e-4);
+    // But for the light that the balls send each other: 1/61 of the sky, times .03.
+    EXPECT_NEAR(truth.photocentre_px.u, want.photocentre_px.u, 5e-3);
+    EXPECT_NEAR(truth.photocentre_px.v, want.photocentre_px.v, 5e-3);
+    EXPECT_NEAR(truth.peak_e / want.peak_e, 1.0, 5e-4);
     EXPECT_NEAR(truth.mask_px, want.mask_px, 2);
     EXPECT_EQ(truth.box.left, want.box.left);
     EXPECT_EQ(truth.box.bottom, want.box.bottom);
@@ -210,7 +210,7 @@ TEST(ImagingChain, ACompanionBesideTheTargetDoesNotChangeItsTruth) {
       return brightest;
     };
     if (earth) continue;
-    EXPECT_GT(dn(with, other.target_px), 50);
+    EXPECT_GT(dn(with, other.target_px), 10);
     EXPECT_LT(dn(image, other.target_px), 5);
   }
 }

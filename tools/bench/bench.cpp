@@ -14,9 +14,10 @@ namespace {
 
 using namespace engine;
 
-starloop::Scenario flyby() {
+starloop::Scenario flyby(const std::vector<std::string>& overrides = {}) {
   starloop::CommonOptions options;
   options.file = STARLOOP_SOURCE_DIR "/config/flyby.toml";
+  options.overrides = overrides;
   return starloop::load_scenario(options);
 }
 
@@ -116,13 +117,13 @@ void bench_poisson(benchmark::State& state) {
 }
 BENCHMARK(bench_poisson)->ArgName("log10_mean")->DenseRange(-2, 4, 1);
 
-/// A whole frame of the paper's pass, so many seconds after its closest point; stages as counters.
-void bench_frame(benchmark::State& state) {
-  const starloop::Scenario scenario = flyby();
-  starloop::Rig rig(scenario, static_cast<int>(state.range(1)));
+/// A frame of the paper's pass, so many seconds after its closest point; stages as counters.
+void expose_flyby(benchmark::State& state, const starloop::Scenario& scenario, double after_s,
+                  int threads) {
+  starloop::Rig rig(scenario, threads);
   hil::ScriptedPointing pointing = rig.prediction();
   Shot shot;
-  shot.shutter_open = sim_time(309781.706 + static_cast<double>(state.range(0)));
+  shot.shutter_open = sim_time(309781.706 + after_s);
   shot.exposure = scenario.run.exposure;
   shot.attitude = {pointing.attitude(shot.shutter_open),
                    pointing.attitude(shot.shutter_open + shot.exposure / 2),
@@ -147,9 +148,29 @@ void bench_frame(benchmark::State& state) {
   state.counters["range_km"] = report.truth.range_m * 1e-3;
   state.counters["rays"] = static_cast<double>(report.render.rays);
 }
+
+void bench_frame(benchmark::State& state) {
+  expose_flyby(state, flyby(), static_cast<double>(state.range(0)),
+               static_cast<int>(state.range(1)));
+}
 BENCHMARK(bench_frame)
     ->ArgNames({"s_after_closest", "threads"})
     ->ArgsProduct({{0, 5, 10, 20}, {1, 2}})
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
+
+/// With companions in a row, so many metres from one to the next: at 16 m beside the target in the
+/// frame, at 5 km out of it.
+void bench_frame_of_bodies(benchmark::State& state) {
+  std::vector<std::string> companions;
+  for (int i = 1; i < state.range(0); ++i)
+    companions.push_back("companions.c" + std::to_string(i) +
+                         ".cross_m=" + std::to_string(i * state.range(1)));
+  expose_flyby(state, flyby(companions), 0.0, 1);
+}
+BENCHMARK(bench_frame_of_bodies)
+    ->ArgNames({"bodies", "metres_apart"})
+    ->ArgsProduct({{1, 2, 4}, {16, 5000}})
     ->Unit(benchmark::kMillisecond)
     ->UseRealTime();
 

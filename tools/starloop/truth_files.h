@@ -40,7 +40,7 @@ class TruthRecorder final : public hil::FrameSink {
     std::uint64_t picture_every = 1;  ///< as PngRecorder
     int width_px = 0;
     int height_px = 0;
-    std::vector<std::string> companions;  ///< their names
+    std::vector<std::string> companions{};  ///< their names
     hil::WhenBusy when_busy = hil::WhenBusy::kDropFrame;
   };
   /// Throws std::runtime_error when truth.jsonl cannot be made.
