@@ -68,7 +68,8 @@ Optics::Optics(const OpticsSpec& spec, double faint_w_m2, WorkerPool& pool)
       throughput_sr_(engine::throughput_sr(spec)),
       faint_w_m2_(faint_w_m2),
       pool_(pool) {
-  const int side = std::max(spec.camera.width_px, spec.camera.height_px) + 4 * spec.largest_wing_px;
+  // Light from beyond the frame, and beyond that room for the wings and for as much smear.
+  const int side = std::max(spec.camera.width_px, spec.camera.height_px) + 6 * spec.largest_wing_px;
   std::vector<int> lengths = fast_lengths(side);
   const int longest = lengths.back() * kOversampling;
   for (std::size_t i = 0, n = lengths.size(); i < n; ++i)

@@ -473,6 +473,20 @@ TEST(Optics, LightAtOneEdgeDoesNotShowAtTheOther) {
   }
 }
 
+TEST(Optics, HoldsAllLightThatMayCome) {
+  // The whole frame and all that is looked at beyond it, with the longest smear: the largest grid
+  // there is, and the rows' buffers must hold it.
+  WorkerPool pool(2);
+  Optics optics(spec_of(), kFaint_w_m2, pool);
+  const int beyond = optics.wish().beyond_frame_px;
+  Radiance in = plate_over({-beyond, -beyond, kSide_px + beyond, kSide_px + beyond});
+  in.motion_px = {500.0, 500.0};
+  IrradianceImage image;
+  optics.project(in, image);
+  const double throughput = kPi / 4.0 * 0.08 * 0.08 * 0.7;
+  EXPECT_NEAR(static_cast<double>(image.at(kSide_px / 2, kSide_px / 2)) / throughput, 1.0, 1e-3);
+}
+
 TEST(Optics, LightDoesNotWrapRoundItsOwnWindow) {
   // A bright point at the left of a wide dark region: at the region's far end only its own wing,
   // and the echo from the padding, not nearer than the wing's length.
