@@ -59,7 +59,9 @@ std::vector<engine::FitsCard> header_of(const Scenario& s, const RenderOptions& 
 }  // namespace
 
 int render_frame(const CommonOptions& options, const RenderOptions& render) {
-  const Scenario scenario = load_scenario(options);
+  Scenario scenario = load_scenario(options);
+  // What a run gathers over its frames this one has from the beginning.
+  scenario.render.settled = true;
   Rig rig(scenario, options.threads);
   hil::ScriptedPointing pointing = rig.prediction();
   engine::Shot shot;
