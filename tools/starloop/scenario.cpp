@@ -232,6 +232,7 @@ Scenario read_scenario(const ConfigReader& config) {
   s.jitter = hil::read_jitter(config);
   s.sensors = hil::read_sensors(config.table("sensors"));
   s.tracker = read_tracker(config.table("tracker"), s.scene.camera);
+  s.tracker.black_dn = s.detector.pedestal_dn;
   config.reject_unknown_keys();
   return s;
 }
