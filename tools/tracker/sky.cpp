@@ -1,14 +1,16 @@
 #include "tools/tracker/sky.h"
 
 #include <algorithm>
+#include <numeric>
 
 namespace tracker {
 namespace {
 
-constexpr int kEvery_px = 4;         // a block is judged by every so many pixels, each way
-constexpr int kReach_blocks = 12;    // of the blocks around
-constexpr int kEvery_blocks = 2;     // and of these every other one, each way
-constexpr double kOneSigma = 0.841;  // what of a normal distribution stays under its sigma
+constexpr int kEvery_px = 4;           // a block is judged by every so many pixels, each way
+constexpr int kMostReach_blocks = 12;  // of the blocks around
+constexpr int kReachShare = 3;         // or this part of the frame, where that is less
+constexpr int kMostEvery_blocks = 2;   // and of these every other one, each way, if they are many
+constexpr double kOneSigma = 0.841;    // what of a normal distribution stays under its sigma
 constexpr double kLeastNoise_dn = 0.5;
 
 double median_of(std::vector<double>& values) {
@@ -56,34 +58,41 @@ void Sky::measure_blocks(const cv::Mat& image) {
   }
 }
 
-/// The median over all blocks and those that are so far from them, in DN a block.
+/// Over all blocks and their neighbours, in DN a block: the mean of the middle third, which is
+/// finer than a DN, and neither a step's nor a target's.
 double Sky::slope(int columns_apart, int rows_apart) {
   levels_.clear();
   for (int row = 0; row + rows_apart < rows_; ++row)
     for (int column = 0; column + columns_apart < columns_; ++column)
       levels_.push_back(measured_[index(column + columns_apart, row + rows_apart)].level_dn -
                         measured_[index(column, row)].level_dn);
-  const int apart = columns_apart + rows_apart;
-  return apart > 0 && !levels_.empty() ? median_of(levels_) / apart : 0.0;
+  if (levels_.empty()) return 0.0;
+  std::sort(levels_.begin(), levels_.end());
+  const auto third = static_cast<std::ptrdiff_t>(levels_.size() / 3);
+  const auto begin = levels_.begin() + third;
+  const auto end = levels_.end() - third;
+  return std::accumulate(begin, end, 0.0) / static_cast<double>(end - begin);
 }
 
 void Sky::take_plane_out() {
-  slope_u_dn_ = slope(columns_ / 2, 0);
-  slope_v_dn_ = slope(0, rows_ / 2);
+  slope_u_dn_ = slope(1, 0);
+  slope_v_dn_ = slope(0, 1);
   for (int row = 0; row < rows_; ++row)
     for (int column = 0; column < columns_; ++column)
       measured_[index(column, row)].level_dn -= slope_u_dn_ * column + slope_v_dn_ * row;
 }
 
 void Sky::follow_majority() {
+  const int reach = std::clamp(std::min(columns_, rows_) / kReachShare, 1, kMostReach_blocks);
+  const int every = std::min(reach, kMostEvery_blocks);
   for (int row = 0; row < rows_; ++row) {
     for (int column = 0; column < columns_; ++column) {
       levels_.clear();
       noises_.clear();
-      for (int r = std::max(0, row - kReach_blocks); r <= std::min(rows_ - 1, row + kReach_blocks);
-           r += kEvery_blocks) {
-        for (int c = std::max(0, column - kReach_blocks);
-             c <= std::min(columns_ - 1, column + kReach_blocks); c += kEvery_blocks) {
+      for (int r = row - reach; r <= row + reach; r += every) {
+        if (r < 0 || r >= rows_) continue;
+        for (int c = column - reach; c <= column + reach; c += every) {
+          if (c < 0 || c >= columns_) continue;
           levels_.push_back(measured_[index(c, r)].level_dn);
           noises_.push_back(measured_[index(c, r)].noise_dn);
         }

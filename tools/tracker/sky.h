@@ -9,8 +9,8 @@ namespace tracker {
 
 /// What lies behind the target, block by block: how bright it is, and how noisy.
 ///
-/// The median of each block, less a plane that is the median slope of the frame; of that the
-/// median over the blocks around, as wide as most of the frame: a target is no majority there. So
+/// The median of each block, less a plane that has the frame's usual slope; of that the median
+/// over the blocks around, two thirds of the frame wide: a target is no majority there. So
 /// the level follows a gradient, and a step as far as its straight edge.
 /// Leaves out: what is finer than a block; a target that covers half of the frame is its sky.
 class Sky {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <tuple>
+#include <utility>
 
 #include <opencv2/imgproc.hpp>
 
@@ -92,23 +92,39 @@ Tracker::Region Tracker::choose_region(const drivers::FrameView& view) {
   // Close the gaps that shadows cut into the target.
   cv::dilate(differs_, grown_, cv::getStructuringElement(cv::MORPH_RECT, {9, 9}));
   const int count = cv::connectedComponentsWithStats(grown_, labels_, stats, centres, 8, CV_32S);
-  Region best;
-  std::tuple<bool, bool, int> best_rank;
+  const auto box_of = [&stats](int i) {
+    return cv::Rect(stats.at<int>(i, cv::CC_STAT_LEFT), stats.at<int>(i, cv::CC_STAT_TOP),
+                    stats.at<int>(i, cv::CC_STAT_WIDTH), stats.at<int>(i, cv::CC_STAT_HEIGHT));
+  };
+  // A single pixel alone dilates to 81. A limb or a terminator crosses the frame.
+  const auto may_be_target = [&](int i) {
+    const cv::Rect box = box_of(i);
+    return stats.at<int>(i, cv::CC_STAT_AREA) >= 81 + kSmallestArea_px && box.width < width_px_ &&
+           box.height < height_px_;
+  };
   int largest = 0;
-  for (int i = 1; i < count; ++i) largest = std::max(largest, stats.at<int>(i, cv::CC_STAT_AREA));
+  for (int i = 1; i < count; ++i)
+    if (may_be_target(i)) largest = std::max(largest, stats.at<int>(i, cv::CC_STAT_AREA));
+  Region best;
+  std::pair<bool, int> best_rank;
   for (int i = 1; i < count; ++i) {
+    if (!may_be_target(i)) continue;
     const int area = stats.at<int>(i, cv::CC_STAT_AREA);
-    // A single pixel alone dilates to 81.
-    if (area < 81 + kSmallestArea_px) continue;
-    const cv::Rect box(stats.at<int>(i, cv::CC_STAT_LEFT), stats.at<int>(i, cv::CC_STAT_TOP),
-                       stats.at<int>(i, cv::CC_STAT_WIDTH), stats.at<int>(i, cv::CC_STAT_HEIGHT));
-    // A limb or a terminator crosses the frame. A speck is no target for being near its place.
-    const bool crosses = box.width == width_px_ || box.height == height_px_;
-    const bool expected = locked_ && kSpeckShare * area >= largest && expected_in(box, view);
-    const std::tuple rank(!crosses, expected, area);
+    // A speck is no target for being near its place.
+    const bool expected = locked_ && kSpeckShare * area >= largest && expected_in(box_of(i), view);
+    const std::pair rank(expected, area);
     if (best.label != 0 && rank <= best_rank) continue;
-    best = {box, i};
+    best = {box_of(i), i};
     best_rank = rank;
+  }
+  if (best.label == 0) return best;
+  // A panel may stand off by more than the gaps that have been closed.
+  const cv::Rect core = best.box;
+  for (int i = 1; i < count; ++i) {
+    const cv::Rect box = box_of(i);
+    if (i == best.label || !may_be_target(i) || (box & core).area() == 0) continue;
+    labels_(box).setTo(best.label, labels_(box) == i);
+    best.box |= box;
   }
   return best;
 }

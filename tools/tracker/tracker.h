@@ -26,15 +26,16 @@ struct TrackerSpec {
 /// An example of software under test: sees a frame's bytes, answers with a command's bytes.
 ///
 /// What differs from the sky around it by more than the sky's own noise, brighter or darker; of the
-/// regions that this makes the largest that is where the target is expected, once it has been seen;
-/// the centroid of its light; and one alpha-beta filter an axis on what is wrong with the pointing:
-/// the target's place in the field plus the trim that was on when the frame was taken. The command
-/// asks for that trim, and for its rate.
+/// regions that this makes the largest that is where the target is expected, once it has been seen,
+/// with those that its box meets; the centroid of its light; and one alpha-beta filter an axis on
+/// what is wrong with the pointing: the target's place in the field plus the trim that was on when
+/// the frame was taken. The command asks for that trim, and for its rate.
 ///
 /// Before a bright sky, the Earth, a target is partly darker than what it hides. Its own light is
 /// then what differs plus what it hides of the sky: the sky's level times how much of each pixel it
 /// covers. That is 1 inside; at an edge the share that the difference has of the largest beside it.
-/// Leaves out: parts as bright as the sky are taken for sky, and gaps under 5 px for target; on a
+/// Leaves out: a target that touches what crosses the frame, as the Earth's limb does where it is
+/// sharp; parts as bright as the sky are taken for sky, and gaps under 5 px for target; on a
 /// telescope 60 to 130 px across that is 0.2 to 1.5 px of its centre.
 class Tracker {
  public:
