@@ -82,6 +82,10 @@ RenderReport PathTracer::render(const Snapshot& snapshot, Budget budget, Radianc
   target_->facets.light_up(snapshot, pool_, glint_radius_rad);
   const TracedFrame frame(snapshot, spec_.camera, target_->bounding_radius_m,
                           sun_radius_for(snapshot, report));
+  // Samples know the cap; what harmonics leave out they find.
+  const bool cap = frame.lamps.earth != nullptr;
+  report.add({"earthshine", name_of(cap ? EarthshineModel::kCap : snapshot.earthshine_rung.model),
+              cap ? 0.0 : snapshot.earthshine_rung.error_e});
   std::fill(row_counts_.begin(), row_counts_.end(), RowCounts{});
   choose_samples(frame, snapshot, budget, out.region);
   run_passes(frame, snapshot, budget, start, out, report);

@@ -18,7 +18,7 @@ std::size_t at(int i) noexcept { return static_cast<std::size_t>(i); }
 
 TracedFrame::TracedFrame(const Snapshot& snapshot, const CameraGeometry& camera,
                          double bounding_radius_m, double sun_radius_rad) noexcept
-    : lamps(lamp_cones(snapshot, sun_radius_rad)), origin(snapshot.camera.m) {
+    : lamps(lamps_with_cap(snapshot, sun_radius_rad)), origin(snapshot.camera.m) {
   const Matrix3d& axes = snapshot.body_from_camera.matrix;
   at_zero = axes * camera.direction_at({0.0, 0.0});
   per_u = axes.col(0) * camera.ifov_rad();
@@ -49,8 +49,9 @@ void RowTracer::trace(int column, PixelPoint pixel, std::span<const std::uint32_
                       int last) noexcept {
   const int cells = side_ * side_;
   // In 2^-32, so that no rounding makes the share another one.
-  const auto share = static_cast<std::uint64_t>(
-      std::llround(0x1p32 * (bounced_.bounces() > 0 ? rules_.bounce_share : 0.0)));
+  const bool follows = bounced_.bounces() > 0 || frame_->lamps.earth != nullptr;
+  const auto share =
+      static_cast<std::uint64_t>(std::llround(0x1p32 * (follows ? rules_.bounce_share : 0.0)));
   CameraQueue& q = camera_;
   for (int r = 0; r < replicates_; ++r) {
     const std::uint32_t key = keys[at(r)];
@@ -122,13 +123,17 @@ void RowTracer::send_camera_rays() noexcept {
     const Vector3f direction(rays.direction_x[i], rays.direction_y[i], rays.direction_z[i]);
     points[i] = target_.facets.at(hits[i], direction);
     if (camera_.bouncing[i] < 0) continue;
-    waiting_[paths_++] = {{points[i], direction.normalized(),
-                           SampleNumbers(rules_.sequence, camera_.key[i],
-                                         static_cast<std::uint32_t>(camera_.bouncing[i]))},
-                          camera_.slot[i]};
+    waiting_[paths_] = {{points[i], direction.normalized(),
+                         SampleNumbers(rules_.sequence, camera_.key[i],
+                                       static_cast<std::uint32_t>(camera_.bouncing[i]))},
+                        camera_.slot[i]};
+    if (frame_->lamps.earth != nullptr)
+      waiting_[paths_].path.earth_asked = static_cast<float>(1.0 / rules_.bounce_share);
+    ++paths_;
   }
   if (!any) return;
   light_directly(points, hits);
+  if (frame_->lamps.earth != nullptr) light_by_earth(rays, points, hits);
   while (paths_ >= kLanes) bounce(kLanes);
 }
 
@@ -154,6 +159,25 @@ void RowTracer::light_directly(const std::array<SurfacePoint, kLanes>& points,
       ask(direct_[k], RayCoherence::kParallel, counts_[1], points[i], way, camera_.slot[i],
           static_cast<double>(light));
     }
+  }
+}
+
+/// Every sample asks for it once; those that follow a bounce may run into it as well.
+void RowTracer::light_by_earth(const RayPacket& rays,
+                               const std::array<SurfacePoint, kLanes>& points,
+                               const std::array<MeshHit, kLanes>& hits) noexcept {
+  SampleLanes lanes;
+  lanes.pairs(rules_.sequence, camera_.key, camera_.sample, BouncedLight::kDirectEarth);
+  for (std::size_t i = 0; i < kLanes; ++i) {
+    if (hits[i].triangle == MeshHit::kNone) continue;
+    const EarthLight::Sample sample = frame_->lamps.earth->sample(
+        static_cast<double>(lanes.first[i]), static_cast<double>(lanes.second[i]));
+    const Vector3f direction(rays.direction_x[i], rays.direction_y[i], rays.direction_z[i]);
+    const double light =
+        bounced_.earthshine(sample, points[i], direction.normalized(), 1.0 / rules_.bounce_share);
+    if (light > 0.0)
+      ask(direct_[1], RayCoherence::kScattered, counts_[1], points[i],
+          sample.direction.cast<float>(), camera_.slot[i], light);
   }
 }
 
@@ -197,20 +221,24 @@ void RowTracer::bounce(std::size_t count) noexcept {
       light_[w.slot] += bounced_.escaped(frame_->lamps, w.path) / rules_.bounce_share;
       continue;
     }
+    if (bounced_.longest(w.path)) continue;
     const BouncedLight::Question question =
         bounced_.arrive(frame_->lamps, w.path, target_.facets.at(hits[i], w.path.direction));
     if (question.light_w_m2_sr > 0.0) {
       ask(bounced_shadow_, RayCoherence::kScattered, counts_[3], w.path.from, question.toward,
           w.slot, question.light_w_m2_sr / rules_.bounce_share);
     }
-    if (!bounced_.longest(w.path)) waiting_[paths_++] = w;
+    if (bounced_.may_go_on(w.path)) waiting_[paths_++] = w;
   }
 }
 
 void RowTracer::finish() noexcept {
   if (camera_.used > 0) send_camera_rays();
   while (paths_ > 0) bounce(std::min(paths_, kLanes));
-  for (ShadowQueue& queue : direct_) send(queue, RayCoherence::kParallel, counts_[1]);
+  send(direct_[0], RayCoherence::kParallel, counts_[1]);
+  send(direct_[1],
+       frame_->lamps.earth != nullptr ? RayCoherence::kScattered : RayCoherence::kParallel,
+       counts_[1]);
   send(bounced_shadow_, RayCoherence::kScattered, counts_[3]);
 }
 

@@ -95,6 +95,8 @@ class RowTracer {
   void send_camera_rays() noexcept;
   void light_directly(const std::array<SurfacePoint, kLanes>& points,
                       const std::array<MeshHit, kLanes>& hits) noexcept;
+  void light_by_earth(const RayPacket& rays, const std::array<SurfacePoint, kLanes>& points,
+                      const std::array<MeshHit, kLanes>& hits) noexcept;
   void ask(ShadowQueue& queue, RayCoherence coherence, RayCounts& counts, const SurfacePoint& from,
            const Eigen::Vector3f& toward, std::uint32_t slot, double light) noexcept;
   void send(ShadowQueue& queue, RayCoherence coherence, RayCounts& counts) noexcept;

@@ -88,6 +88,8 @@ int render_frame(const CommonOptions& options, const RenderOptions& render) {
     if (std::isfinite(noise.rms))
       std::printf("rendering noise %.3f of the sensor's over %d lit pixels, at worst %.2f\n",
                   noise.rms, noise.lit_px, noise.worst);
+    if (scenario.run.render_time > engine::Duration{})
+      std::printf("render.deadline_ms is for runs: this picture took the time it needed\n");
     for (const engine::Rung& rung : report.render.rungs)
       if (!rung.ladder.empty())
         std::printf("%s: %s%s\n", std::string(rung.ladder).c_str(), std::string(rung.taken).c_str(),
