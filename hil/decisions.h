@@ -14,6 +14,7 @@ struct Decisions {
   struct Due {
     std::uint64_t frame = 0;
     bool exposed = false;  ///< false: dropped; commands were obeyed all the same
+    int passes = 0;        ///< of rendering, where a clock said when to stop; 0: none did
   };
   std::vector<Due> due;                 ///< by frame, ascending
   std::vector<CommandRecord> commands;  ///< in the order in which they were obeyed

@@ -198,7 +198,14 @@ void FrameLoop::expose(std::uint64_t k, std::size_t slot, FrameRecord& record) n
   record.trim_rad = pointing_.trim_rad();
   record.measured = pointing_.measured();
   shot.attitude.close = pointing_.attitude(open + spec_.exposure);
-  record.report = generator_.expose(shot, engine::Budget{}, s.pixels, s.mask);
+  engine::Budget budget;
+  if (spec_.replay != nullptr) {
+    budget.passes = spec_.replay->due[next_due_].passes;
+  } else {
+    budget.time = spec_.render_time;
+  }
+  record.report = generator_.expose(shot, budget, s.pixels, s.mask);
+  if (budget.time > Duration{} || budget.passes > 0) record.passes = record.report.render.passes;
   s.frame = {.sequence = k,
              .shutter_open = open,
              .exposure = spec_.exposure,

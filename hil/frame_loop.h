@@ -39,6 +39,9 @@ struct LoopSpec {
   /// If given, each frame waits this long for a pull; without one the run ends.
   Trigger* trigger = nullptr;
   engine::Duration trigger_timeout{};
+  /// Rendering stops with what it has once it has taken this long, and the record says after how
+  /// many passes. Zero: it is finished. The one thing in a frame that a clock decides.
+  engine::Duration render_time{};
   HiccupMeter* hiccups = nullptr;  ///< if given, says which delays are the machine's
   bool open_loop = false;          ///< commands count as reports: nothing of them is obeyed
   int service_priority = 0;        ///< SCHED_FIFO of sender and receiver; 0: ordinary

@@ -20,6 +20,7 @@ struct FrameRecord {
   TrimAngles trim_rad{};
   MeasuredAttitude measured;
   std::uint64_t skipped_before = 0;  ///< periods lost before this frame, because we were too slow
+  int passes = 0;                    ///< of rendering, where a clock said when to stop; 0: none did
   bool handed_over = false;          ///< false: dropped, the link held every slot
 };
 

@@ -49,13 +49,15 @@ void Recorder::log(const CommandRecord& command) noexcept {
 
 void Recorder::log(const FrameRecord& frame) noexcept {
   using Kind = LogDecision::Kind;
+  const Kind exposed = frame.passes > 0 ? Kind::kExposedInPasses : Kind::kExposed;
   push({LogType::kDecision,
         {},
-        {.kind = frame.handed_over ? Kind::kExposed : Kind::kDropped,
+        {.kind = frame.handed_over ? exposed : Kind::kDropped,
          .frame = frame.sequence,
          .shutter_open = frame.shutter_open,
          .late = frame.late,
-         .skipped_before = frame.skipped_before}});
+         .skipped_before = frame.skipped_before,
+         .passes = frame.passes}});
 }
 
 void Recorder::push(const Entry& entry) noexcept {

@@ -153,8 +153,11 @@ bool decode(std::span<const std::byte> in, CommandRecord& record) {
 bool decode(std::span<const std::byte> in, LogDecision& d) {
   Reader r(in);
   r.get(d.kind).get(d.frame).get(d.shutter_open).get(d.late).get(d.skipped_before);
-  return r.done() &&
-         (d.kind == LogDecision::Kind::kExposed || d.kind == LogDecision::Kind::kDropped);
+  using Kind = LogDecision::Kind;
+  const bool in_passes = d.kind == Kind::kExposedInPasses;
+  if (in_passes) r.get(d.passes);
+  if (!r.done() || in_passes != (d.passes > 0)) return false;
+  return in_passes || d.kind == Kind::kExposed || d.kind == Kind::kDropped;
 }
 
 bool decode(std::span<const std::byte> in, LogEnd& end) {
@@ -193,7 +196,7 @@ const char* add(const RawRecord& record, Recording& out) {
       auto& due = out.decisions.due;
       if (d.frame >= out.start.loop.frames || (!due.empty() && d.frame <= due.back().frame))
         return kNonsense;
-      due.push_back({d.frame, d.kind == LogDecision::Kind::kExposed});
+      due.push_back({d.frame, d.kind != LogDecision::Kind::kDropped, d.passes});
       return nullptr;
     }
     case LogType::kEnd: {
@@ -238,6 +241,7 @@ void encode(const CommandRecord& record, LogBytes& out) {
 void encode(const LogDecision& d, LogBytes& out) {
   Writer w(out);
   w.put(d.kind).put(d.frame).put(d.shutter_open).put(d.late).put(d.skipped_before);
+  if (d.kind == LogDecision::Kind::kExposedInPasses) w.put(d.passes);
 }
 
 void encode(const LogEnd& end, LogBytes& out) {

@@ -33,9 +33,10 @@ BodyLight::BodyLight(const TracedTarget& target, int bounces, WorkerPool& pool)
   for (Kept& kept : lamps_) {
     kept.lit_share.resize(n);
     kept.leaving.resize(n);
+    kept.bounced.resize(n);
     kept.arriving.resize(n);
   }
-  for (std::vector<float>* v : {&sent_, &next_, &to_camera_, &leaving_})
+  for (std::vector<float>* v : {&sent_, &next_, &to_camera_[0], &to_camera_[1], &leaving_})
     v->resize(std::max<std::size_t>(n, 1));
 }
 
@@ -102,6 +103,7 @@ void BodyLight::renew(Kept& kept, const Vector3f& toward, WorkerPool& pool) noex
     const double albedo = c > 0.0 ? target_.facets.brdf(patch.material).albedo(c) : 0.0;
     sent_[p] = static_cast<float>(c * albedo / kPi) * kept.lit_share[p];
     kept.leaving[p] = sent_[p];
+    kept.bounced[p] = 0.0F;
     kept.arriving[p].fill(0.0F);
   });
   for (int bounce = 1; bounce <= bounces_; ++bounce) {
@@ -117,6 +119,7 @@ void BodyLight::renew(Kept& kept, const Vector3f& toward, WorkerPool& pool) noex
       const double albedo = target_.facets.brdf(patches_.patch(p).material).albedo(2.0 / 3.0);
       next_[p] = static_cast<float>(albedo) * sum / HemisphereBins::kBins;
       kept.leaving[p] += next_[p];
+      if (bounce < bounces_) kept.bounced[p] += next_[p];
     });
     std::swap(sent_, next_);
   }
@@ -138,18 +141,15 @@ void BodyLight::light_up(const Snapshot& snapshot, WorkerPool& pool) noexcept {
     leaving_[p] = 0.0F;
     for (std::size_t k = 0; k < kLamps; ++k)
       if (irradiance[k] > 0.0F) leaving_[p] += irradiance[k] * lamps_[k].leaving[p];
-    to_camera_[p] = 0.0F;
     const Vector3f to_camera =
         (snapshot.camera.m - patch.points[0].place.cast<double>()).normalized().cast<float>();
     const Vector3f out = patch.axes * to_camera;
-    if (!(out.z() > 0.0F)) return;
-    HemisphereBins::Values arriving{};
     for (std::size_t k = 0; k < kLamps; ++k) {
-      if (irradiance[k] == 0.0F) continue;
-      for (std::size_t bin = 0; bin < arriving.size(); ++bin)
-        arriving[bin] += irradiance[k] * lamps_[k].arriving[p][bin];
+      to_camera_[k][p] = 0.0F;
+      if (irradiance[k] > 0.0F && out.z() > 0.0F)
+        to_camera_[k][p] =
+            irradiance[k] * binned_[patch.material].reflected(lamps_[k].arriving[p], out);
     }
-    to_camera_[p] = binned_[patch.material].reflected(arriving, out);
   });
 }
 

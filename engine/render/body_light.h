@@ -19,8 +19,8 @@ namespace engine {
 /// BouncedLight has it; towards the camera a patch reflects it by its BRDF.
 /// Lamps are taken from the nearest of directions 8 mrad apart: what is kept is a function of
 /// these alone, so that a frame does not depend on those before it.
-/// Leaves out what took more than `bounces` bounces; changes finer than a patch: see
-/// SurfacePatches::Patch::crowded().
+/// Leaves out what took more than `bounces` bounces, and changes finer than a patch: those are
+/// TexelLight's.
 /// Thread: loop. Loop-safe but for the constructor. The target outlives it.
 class BodyLight {
  public:
@@ -29,8 +29,11 @@ class BodyLight {
   /// For the snapshot's lamps and camera.
   void light_up(const Snapshot& snapshot, WorkerPool& pool) noexcept;
 
-  /// What each patch sends to the camera, in W/m^2/sr, but for what it mirrors.
-  [[nodiscard]] std::span<const float> to_camera() const noexcept { return to_camera_; }
+  /// What each patch sends to the camera of a lamp's light, in W/m^2/sr, but for what it mirrors;
+  /// nothing of a lamp that is off.
+  [[nodiscard]] std::span<const float> to_camera(std::size_t lamp) const noexcept {
+    return to_camera_[lamp];
+  }
   /// Of the light that it mirrors, the share that it sends to the camera; 0 for most materials.
   [[nodiscard]] float mirror_share(std::uint32_t material, float cos_out) const noexcept {
     return binned_[material].mirror_share(cos_out);
@@ -41,6 +44,13 @@ class BodyLight {
     const std::uint32_t patch = patches_.at(place);
     return patch == SurfacePatches::kNone ? 0.0F : leaving_[patch];
   }
+  /// What leaves a patch of light that has bounced before, for 1 W/m^2 of a lamp.
+  [[nodiscard]] float further(std::size_t lamp, std::uint32_t patch) const noexcept {
+    return patch < SurfacePatches::kSky ? lamps_[lamp].bounced[patch] : 0.0F;
+  }
+  [[nodiscard]] const BinnedBrdf& binned(std::uint32_t material) const noexcept {
+    return binned_[material];
+  }
   [[nodiscard]] const SurfacePatches& patches() const noexcept { return patches_; }
 
  private:
@@ -49,6 +59,7 @@ class BodyLight {
     Eigen::Vector3f toward = Eigen::Vector3f::Zero();  ///< zero: nothing kept
     std::vector<float> lit_share;
     std::vector<float> leaving;
+    std::vector<float> bounced;                    ///< of what leaves, what has bounced before
     std::vector<HemisphereBins::Values> arriving;  ///< radiance by bin, in the patch's axes
   };
   template <class Work>
@@ -64,7 +75,7 @@ class BodyLight {
   std::array<Kept, kLamps> lamps_;
   std::vector<float> sent_;  ///< by patch, of one bounce
   std::vector<float> next_;
-  std::vector<float> to_camera_;
+  std::array<std::vector<float>, kLamps> to_camera_;
   std::vector<float> leaving_;
 };
 

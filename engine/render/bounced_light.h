@@ -24,10 +24,12 @@ struct BounceRules {
 /// is kept, caustics are spread out. Followed exactly they are found by one sample in thousands,
 /// and those few move the photocentre of a frame by a pixel. With `exact_caustics` they are
 /// followed, and a lamp with a disc is found both by asking for it and by running into it, weighed
-/// by the balance heuristic (Veach 1997, section 9.2.2).
-/// Paths end by roulette: from the second bounce on with the light they carry as their chance.
-/// Leaves out what took more than `bounces` bounces; no path is longer than kMostBounces.
-/// Thread: any. Loop-safe. The target outlives it.
+/// by the balance heuristic (Veach 1997, section 9.2.2). So is the Earth's sunlit cap, where
+/// LampCones have it, and already at what the camera sees: paths may go one step beyond the last
+/// bounce to run into it. Where light is taken to leave evenly it is only asked for. Paths end by
+/// roulette: from the second bounce on with the light they carry as their chance. Leaves out what
+/// took more than `bounces` bounces; no path is longer than kMostBounces. Thread: any. Loop-safe.
+/// The target outlives it.
 class BouncedLight {
  public:
   static constexpr int kMostBounces = 16;
@@ -44,7 +46,10 @@ class BouncedLight {
     float weight = 1;      ///< light at its end, times this, is light at its beginning
     float density = 0;     ///< of `direction`, per steradian
     float sun_chance = 0;  ///< that `from` asked for the Sun; 0 where the path began
-    int bounces = 0;       ///< behind it
+    /// How often `from` asked for the Earth, of which the path may bring its own share; 0: it may
+    /// not.
+    float earth_asked = 0;
+    int bounces = 0;  ///< behind it
   };
   /// Draws where the path goes on. False: it ends.
   [[nodiscard]] bool go_on(Path& path) const noexcept;
@@ -62,6 +67,15 @@ class BouncedLight {
   [[nodiscard]] bool longest(const Path& path) const noexcept {
     return path.bounces >= rules_.bounces;
   }
+  /// As far as its length goes: roulette may end it.
+  [[nodiscard]] bool may_go_on(const Path& path) const noexcept {
+    return !longest(path) || path.earth_asked > 0.0F;
+  }
+  /// What the Earth sends by way of `place` to one who looks along the unit vector `direction`, for
+  /// a sample of it, when nothing is in the way: less what paths from there run into, where it is
+  /// asked for `asked` times for each such path. Its mean over samples, in W/m^2/sr.
+  [[nodiscard]] double earthshine(const EarthLight::Sample& sample, const SurfacePoint& place,
+                                  const Eigen::Vector3f& direction, double asked) const noexcept;
   [[nodiscard]] int bounces() const noexcept { return rules_.bounces; }
 
   /// What one path brings, in W/m^2/sr, to a camera that looks at `from` along the unit vector
@@ -78,13 +92,15 @@ class BouncedLight {
   }
 
   /// Which pair of a sample's numbers is whose.
-  enum Pair : std::uint32_t { kDirectDisc = 1, kFirstBounce = 2 };
+  enum Pair : std::uint32_t { kDirectEarth = 0, kDirectDisc = 1, kFirstBounce = 2 };
 
  private:
   enum PairOfBounce : std::uint32_t { kDirection = 0, kChoice, kLamp, kDisc, kPairs };
   [[nodiscard]] static std::uint32_t pair_of(const Path& path, PairOfBounce which) noexcept {
     return kFirstBounce + static_cast<std::uint32_t>(path.bounces) * kPairs + which;
   }
+  [[nodiscard]] Question ask_earth(const EarthLight& earth, Path& path,
+                                   const std::array<float, 2>& numbers) const noexcept;
 
   const TracedTarget& target_;
   BounceRules rules_;

@@ -51,35 +51,33 @@ BinnedBrdf::BinnedBrdf(const Brdf& brdf)
 
 void BinnedBrdf::tabulate(const Brdf& brdf) {
   weights_.resize(kCosines * kAzimuths);
+  fine_weights_.resize(weights_.size());
   for (std::size_t i = 0; i < kCosines; ++i) {
     const double c = (static_cast<double>(i) + 0.5) / kCosines;
     const double s = std::sqrt(1.0 - c * c);
     for (std::size_t k = 0; k < kAzimuths; ++k) {
       const double azimuth = 2.0 * kPi * static_cast<double>(k) / kAzimuths;
       const Vector3d out(s * std::cos(azimuth), s * std::sin(azimuth), c);
-      HemisphereBins::Values& row = weights_[i * kAzimuths + k];
+      const std::size_t row = i * kAzimuths + k;
       for (std::size_t bin = 0; bin < HemisphereBins::kBins; ++bin) {
         double mean = 0;
         for (int p = 0; p < kStepsInBin * kStepsInBin; ++p) {
-          const Vector3f in = HemisphereBins::direction(
-              bin, (static_cast<float>(p % kStepsInBin) + 0.5F) / kStepsInBin,
-              (static_cast<float>(p / kStepsInBin) + 0.5F) / kStepsInBin);
-          mean += brdf.eval(in.cast<double>(), out) / (kStepsInBin * kStepsInBin);
+          const float a = (static_cast<float>(p % kStepsInBin) + 0.5F) / kStepsInBin;
+          const float b = (static_cast<float>(p / kStepsInBin) + 0.5F) / kStepsInBin;
+          const Vector3f in = HemisphereBins::direction(bin, a, b);
+          // A bin holds pi/64 of the integral over the hemisphere by the cosine.
+          const double share = brdf.eval(in.cast<double>(), out) * kPi /
+                               (HemisphereBins::kBins * kStepsInBin * kStepsInBin);
+          mean += share;
+          fine_weights_[row][HemisphereBins::fine(bin, a, b)] += static_cast<float>(4.0 * share);
         }
-        // A bin holds pi/64 of the integral over the hemisphere by the cosine.
-        row[bin] = static_cast<float>(mean * kPi / HemisphereBins::kBins);
+        weights_[row][bin] = static_cast<float>(mean);
       }
     }
   }
 }
 
-float BinnedBrdf::reflected(const HemisphereBins::Values& arriving,
-                            const Vector3f& out) const noexcept {
-  if (weights_.empty()) {
-    float sum = 0.0F;
-    for (const float a : arriving) sum += a;
-    return diffuse_share_ * sum;
-  }
+BinnedBrdf::Rows BinnedBrdf::rows_round(const Vector3f& out) noexcept {
   const float cell = std::clamp(out.z() * kCosines - 0.5F, 0.0F, kCosines - 1.0F);
   const auto low = std::min(static_cast<std::size_t>(cell), kCosines - 2);
   const float part = cell - static_cast<float>(low);
@@ -89,19 +87,38 @@ float BinnedBrdf::reflected(const HemisphereBins::Values& arriving,
   const float between = turn - whole;
   const std::size_t left = at(static_cast<int>(whole)) % kAzimuths;
   const std::size_t right = (left + 1) % kAzimuths;
-  const HemisphereBins::Values& a = row(low, left);
-  const HemisphereBins::Values& b = row(low, right);
-  const HemisphereBins::Values& c = row(low + 1, left);
-  const HemisphereBins::Values& d = row(low + 1, right);
+  return {{low * kAzimuths + left, low * kAzimuths + right, (low + 1) * kAzimuths + left,
+           (low + 1) * kAzimuths + right},
+          {(1.0F - part) * (1.0F - between), (1.0F - part) * between, part * (1.0F - between),
+           part * between}};
+}
+
+float BinnedBrdf::reflected(const HemisphereBins::Values& arriving,
+                            const Vector3f& out) const noexcept {
+  if (weights_.empty()) {
+    float sum = 0.0F;
+    for (const float a : arriving) sum += a;
+    return diffuse_share_ * sum;
+  }
+  const Rows rows = rows_round(out);
   std::array<float, 16> sums{};
   for (std::size_t i = 0; i < HemisphereBins::kBins; ++i) {
-    const float lower = a[i] + between * (b[i] - a[i]);
-    const float upper = c[i] + between * (d[i] - c[i]);
-    sums[i % sums.size()] += arriving[i] * (lower + part * (upper - lower));
+    float weight = 0.0F;
+    for (std::size_t r = 0; r < rows.index.size(); ++r)
+      weight += rows.share[r] * weights_[rows.index[r]][i];
+    sums[i % sums.size()] += arriving[i] * weight;
   }
   float sum = 0.0F;
   for (const float s : sums) sum += s;
   return sum;
+}
+
+void BinnedBrdf::weigh(const Vector3f& out, HemisphereBins::FineValues& weights) const noexcept {
+  const Rows rows = rows_round(out);
+  weights.fill(0.0F);
+  for (std::size_t r = 0; r < rows.index.size(); ++r)
+    for (std::size_t i = 0; i < weights.size(); ++i)
+      weights[i] += rows.share[r] * fine_weights_[rows.index[r]][i];
 }
 
 float BinnedBrdf::mirror_share(float cos_out) const noexcept {

@@ -70,7 +70,11 @@ class LampCone {
 };
 
 inline constexpr std::size_t kLamps = 2;
-using LampCones = std::array<LampCone, kLamps>;
+struct LampCones {
+  std::array<LampCone, kLamps> cones;
+  const EarthLight* earth = nullptr;  ///< its sunlit cap; none: dark, or one of the cones
+  [[nodiscard]] const LampCone& operator[](std::size_t k) const noexcept { return cones[k]; }
+};
 
 /// The lamps of a body, in a fixed order.
 [[nodiscard]] inline std::array<const Lamp*, kLamps> lamps_of(const BodyView& s) noexcept {
@@ -78,7 +82,14 @@ using LampCones = std::array<LampCone, kLamps>;
 }
 /// Earthshine stays one direction: it is a vector irradiance.
 [[nodiscard]] inline LampCones lamp_cones(const BodyView& s, double sun_half_angle_rad) noexcept {
-  return {LampCone(s.sun, sun_half_angle_rad), LampCone(s.earthshine, 0.0)};
+  return {{LampCone(s.sun, sun_half_angle_rad), LampCone(s.earthshine, 0.0)}};
+}
+/// The same, with the sunlit cap itself in place of its vector where the body has it. The view
+/// outlives them.
+[[nodiscard]] inline LampCones lamps_with_cap(const BodyView& s,
+                                              double sun_half_angle_rad) noexcept {
+  if (s.earth.dark()) return lamp_cones(s, sun_half_angle_rad);
+  return {{LampCone(s.sun, sun_half_angle_rad), LampCone()}, &s.earth};
 }
 
 }  // namespace engine

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 namespace engine {
@@ -17,7 +18,6 @@ constexpr std::array<int, kAskEvery> kAsks = {0, 2, 1, 3};
 constexpr bool asks_first(int x, int y) noexcept {
   return x % kAskEvery == kAsks[static_cast<std::size_t>(y % kAskEvery)];
 }
-constexpr int kTries = 16;
 // Of a cell's points of one facet: so few are asked at once.
 constexpr int kFewPoints = 6;
 
@@ -32,8 +32,7 @@ LatticeRenderer::LatticeRenderer(const RenderSpec& spec, std::shared_ptr<TracedT
       view_(spec, target_),
       lamp_views_{LampView(target_->mesh), LampView(target_->mesh)},
       body_light_(*target_, spec.bounces, pool),
-      bounced_paths_(*target_, spec.bounces),
-      bounced_(*target_, body_light_.patches()),
+      texels_(*target_, body_light_, spec.bounces),
       paths_(spec, target_, pool),
       pool_(pool) {
   const PixelRect all = spec.camera.frame().grown_by(spec.grid.beyond_frame_px);
@@ -81,6 +80,16 @@ RenderReport LatticeRenderer::render(const Snapshot& snapshot, Budget budget,
   report.visible_fraction = view_.footprint().visible_fraction();
   if (region.empty()) return report;
   light_up(snapshot);
+  if (spec_.bounces > 0) {
+    texel_lamp_ = snapshot.sun.irradiance_w_m2 > 0.0 ? 0 : 1;
+    const TexelLight::LampInView lamp{texel_lamp_, lamp_views_[texel_lamp_]};
+    const double px_m = snapshot.camera.m.norm() * spec_.camera.ifov_rad();
+    texels_.update(snapshot, lamp, px_m, spec_.settled, pool_);
+    if (texels_.cold() || spec_.settled) {
+      pool_.rows(0, region.height(), [&](int row) { shade_row(snapshot, out, row); });
+      texels_.update(snapshot, lamp, px_m, spec_.settled, pool_);
+    }
+  }
   pool_.rows(0, region.height(), [&](int row) { shade_row(snapshot, out, row); });
   for (int row = 0; row < region.height(); ++row) {
     const RowCounts& counts = row_counts_[at(row)];
@@ -103,7 +112,6 @@ void LatticeRenderer::light_up(const Snapshot& snapshot) noexcept {
     if (lamps[k]->irradiance_w_m2 > 0.0) lamp_views_[k].update(lamps[k]->toward.unit, pool_);
   }
   body_light_.light_up(snapshot, pool_);
-  bounced_.update(body_light_.to_camera(), snapshot.camera.m, pool_);
 }
 
 void LatticeRenderer::shade_row(const Snapshot& snapshot, Radiance& out, int index) noexcept {
@@ -139,19 +147,14 @@ bool LatticeRenderer::all_see(const Row& row, int column, std::uint32_t facet) c
   return differs == 0;
 }
 
-void LatticeRenderer::shade_pixel(const Row& row, int column) const noexcept {
+void LatticeRenderer::shade_pixel(const Row& row, int column) noexcept {
   const int n = view_.points_a_pixel();
   std::vector<Tone>& tones = row.bench.tones;
   tones.clear();
   const std::uint32_t first = row.bench.seen[at(column * n)];
   if (all_see(row, column, first)) {
     if (first == TriangleRaster::kNone) return;
-    Tone tone;
-    tone.facet = first;
-    tone.points = static_cast<std::uint32_t>(n * n);
-    tone.in_cell.fill(static_cast<std::uint16_t>(view_.side() * view_.side()));
-    tone.sum_x = tone.sum_y = 0.5F * static_cast<float>(n) * static_cast<float>(n * n);
-    tones.push_back(tone);
+    tones.push_back(whole_pixel(first));
   } else {
     collect(row, column);
   }
@@ -188,13 +191,30 @@ void LatticeRenderer::add_run(const Row& row, std::size_t& last, std::uint32_t f
     }
   }
   Tone& tone = tones[last];
-  const auto points = static_cast<float>(length);
-  tone.points += static_cast<std::uint32_t>(length);
-  const int cell = y / view_.side() * spec_.grid.oversampling + x / view_.side();
-  tone.in_cell[at(cell)] =
-      static_cast<std::uint16_t>(tone.in_cell[at(cell)] + static_cast<unsigned>(length));
-  tone.sum_x += points * (static_cast<float>(x) + 0.5F * points);
-  tone.sum_y += points * (static_cast<float>(y) + 0.5F);
+  const auto points = static_cast<unsigned>(length);
+  const std::size_t cell = at(y / view_.side() * spec_.grid.oversampling + x / view_.side());
+  const auto add_to = [cell](auto& sums, unsigned more) {
+    sums[cell] = static_cast<std::uint16_t>(sums[cell] + more);
+  };
+  tone.points += points;
+  add_to(tone.in_cell, points);
+  add_to(tone.sum_x, points * (2U * static_cast<unsigned>(x) + points));
+  add_to(tone.sum_y, points * (2U * static_cast<unsigned>(y) + 1U));
+}
+
+/// A pixel that sees nothing else.
+LatticeRenderer::Tone LatticeRenderer::whole_pixel(std::uint32_t facet) const noexcept {
+  const auto s = static_cast<unsigned>(spec_.grid.oversampling);
+  const auto side = static_cast<unsigned>(view_.side());
+  Tone tone;
+  tone.facet = facet;
+  tone.points = s * s * side * side;
+  for (unsigned cell = 0; cell < s * s; ++cell) {
+    tone.in_cell[cell] = static_cast<std::uint16_t>(side * side);
+    tone.sum_x[cell] = static_cast<std::uint16_t>(side * side * side * (2U * (cell % s) + 1U));
+    tone.sum_y[cell] = static_cast<std::uint16_t>(side * side * side * (2U * (cell / s) + 1U));
+  }
+  return tone;
 }
 
 /// Light of `points` of a cell's.
@@ -206,39 +226,30 @@ void LatticeRenderer::add(const Row& row, int column, std::size_t cell, float po
                   row.index * s + static_cast<int>(cell) / s) += radiance * points / all;
 }
 
-void LatticeRenderer::shade(const Row& row, int column, const Tone& tone) const noexcept {
+void LatticeRenderer::shade(const Row& row, int column, const Tone& tone) noexcept {
   const int s = spec_.grid.oversampling;
   const int n = view_.points_a_pixel();
   const auto all = static_cast<float>(view_.side() * view_.side());
   row.bench.counts.hits += tone.points;
-  const auto points = static_cast<float>(tone.points);
-  Vector3f direction;
-  const SurfacePoint middle =
-      view_.place_on(tone.facet, static_cast<float>(column * n) + tone.sum_x / points,
-                     static_cast<float>(row.index * n) + tone.sum_y / points, direction);
-  const std::uint32_t patch = body_light_.patches().at(middle);
-  const bool crowded = patch != SurfacePatches::kNone &&
-                       body_light_.patches().patch(patch).crowded() && spec_.bounces > 0 &&
-                       spec_.bounce_paths > 0;
-  float smooth = 0.0F;
-  if (crowded) {
-    smooth = bounced_by_paths(row, column, tone);
-  } else if (patch != SurfacePatches::kNone) {
-    const auto [second, third] = target_->facets.weights_at(tone.facet, middle.place);
-    smooth = bounced_.at(tone.facet, second, third, body_light_.to_camera()[patch]);
-  }
+  unsigned sum_x = 0;
+  unsigned sum_y = 0;
   for (std::size_t cell = 0; cell < at(s * s); ++cell) {
     if (tone.in_cell[cell] == 0) continue;
-    const auto here = static_cast<float>(tone.in_cell[cell]);
-    add(row, column, cell, here, smooth);
+    sum_x += tone.sum_x[cell];
+    sum_y += tone.sum_y[cell];
     row.out.cover.at(column * s + static_cast<int>(cell) % s,
-                     row.index * s + static_cast<int>(cell) / s) += here / all;
+                     row.index * s + static_cast<int>(cell) / s) +=
+        static_cast<float>(tone.in_cell[cell]) / all;
   }
+  const float half_steps = 2.0F * static_cast<float>(tone.points);
+  Vector3f direction;
+  const SurfacePoint middle = view_.place_on(
+      tone.facet, static_cast<float>(column * n) + static_cast<float>(sum_x) / half_steps,
+      static_cast<float>(row.index * n) + static_cast<float>(sum_y) / half_steps, direction);
+  if (spec_.bounces > 0) add_bounced(row, column, tone, middle);
   for (std::size_t k = 0; k < kLamps; ++k)
     if (target_->facets.radiance(tone.facet)[k] > 0.0F) add_lamp(row, column, tone, k);
 
-  // A path finds what is mirrored, too.
-  if (crowded) return;
   const float share =
       body_light_.mirror_share(middle.material, -middle.normal.dot(direction) / direction.norm());
   if (share <= 0.0F) return;
@@ -250,43 +261,39 @@ void LatticeRenderer::shade(const Row& row, int column, const Tone& tone) const 
   if (++queue.used == RayPacket::kLanes) send_mirror_rays(row);
 }
 
-/// Where surfaces stand close together light changes over less than a patch.
-float LatticeRenderer::bounced_by_paths(const Row& row, int column,
-                                        const Tone& tone) const noexcept {
+/// By texels, and by patches where there is none yet.
+void LatticeRenderer::add_bounced(const Row& row, int column, const Tone& tone,
+                                  const SurfacePoint& middle) noexcept {
+  const int s = spec_.grid.oversampling;
   const int n = view_.points_a_pixel();
-  const auto all = static_cast<std::uint32_t>(n * n);
-  const std::uint32_t paths =
-      (static_cast<std::uint32_t>(spec_.bounce_paths) * tone.points + all - 1) / all;
-  // By the pixel's place on the detector, so that a moving region does not move the noise.
-  const auto u = static_cast<std::uint32_t>(row.out.region.left + column);
-  const auto v = static_cast<std::uint32_t>(row.out.region.top + row.index);
-  Draws draws(row.snapshot.seed ^ tone.facet, Stream::kLight, row.snapshot.sequence,
-              (v & 0xFFFFU) << 16U | (u & 0xFFFFU));
-  double sum = 0;
-  for (std::uint32_t path = 0; path < paths; ++path) {
-    int x = 0;
-    int y = 0;
-    bool on_facet = false;
-    for (int t = 0; t < kTries && !on_facet; ++t) {
-      const std::uint32_t point = draws.bits() % all;
-      x = static_cast<int>(point) % n;
-      y = static_cast<int>(point) / n;
-      on_facet = row.bench.seen[at(y) * view_.stride() + at(column * n + x)] == tone.facet;
-    }
-    float place_x = tone.sum_x / static_cast<float>(tone.points);
-    float place_y = tone.sum_y / static_cast<float>(tone.points);
-    if (on_facet) {
-      place_x = static_cast<float>(x) + TriangleRaster::x_in_step(row.index * n + y);
-      place_y = static_cast<float>(y) + TriangleRaster::y_in_step(column * n + x);
-    }
-    Vector3f direction;
-    const SurfacePoint from =
-        view_.place_on(tone.facet, static_cast<float>(column * n) + place_x,
-                       static_cast<float>(row.index * n) + place_y, direction);
-    sum += bounced_paths_.radiance(row.snapshot, from, direction.cast<double>().normalized(), draws,
-                                   row.bench.counts.rays);
+  Vector3f direction;
+  const auto weights = [&](int x, int y) {
+    const SurfacePoint place = view_.place_on(tone.facet, static_cast<float>(column * n + x),
+                                              static_cast<float>(row.index * n + y), direction);
+    const auto [second, third] = target_->facets.weights_at(tone.facet, place.place);
+    return Vector2f(second, third);
+  };
+  // The pixel on the facet: near enough a parallelogram.
+  const Vector2f corner = weights(0, 0);
+  const Vector2f per_half_x = (weights(n, 0) - corner) / static_cast<float>(2 * n);
+  const Vector2f per_half_y = (weights(0, n) - corner) / static_cast<float>(2 * n);
+  const SurfacePoint front = target_->facets.on_side(tone.facet, 0, 0, 0);
+  const unsigned side = middle.normal.dot(front.normal) > 0.0F ? 0 : 1;
+  const float other = kept_by_patch(1 - texel_lamp_, middle);
+  for (std::size_t cell = 0; cell < at(s * s); ++cell) {
+    if (tone.in_cell[cell] == 0) continue;
+    const auto points = static_cast<float>(tone.in_cell[cell]);
+    const Vector2f place = corner + static_cast<float>(tone.sum_x[cell]) / points * per_half_x +
+                           static_cast<float>(tone.sum_y[cell]) / points * per_half_y;
+    float light = texels_.at(tone.facet, side, place.x(), place.y());
+    if (std::isnan(light)) light = kept_by_patch(texel_lamp_, middle);
+    add(row, column, cell, points, light + other);
   }
-  return static_cast<float>(sum / paths);
+}
+
+float LatticeRenderer::kept_by_patch(std::size_t lamp, const SurfacePoint& place) const noexcept {
+  const std::uint32_t patch = body_light_.patches().at(place);
+  return patch == SurfacePatches::kNone ? 0.0F : body_light_.to_camera(lamp)[patch];
 }
 
 void LatticeRenderer::add_lamp(const Row& row, int column, const Tone& tone,

@@ -6,11 +6,11 @@
 #include <vector>
 
 #include "engine/render/body_light.h"
-#include "engine/render/facet_nodes.h"
 #include "engine/render/lamp_view.h"
 #include "engine/render/lattice_view.h"
 #include "engine/render/path_tracer.h"
 #include "engine/render/render_spec.h"
+#include "engine/render/texel_light.h"
 
 namespace engine {
 
@@ -20,7 +20,9 @@ namespace engine {
 /// of a pixel is which share of it each facet covers and which of that is in the light. The shares
 /// come from a z-buffer of 4 to 64 points a cell (LatticeView), at a tenth of what rays cost. Where
 /// a lamp's own view cannot tell light from shadow (LampView), rays ask: one point in four, and
-/// all where these disagree. Light that bounces is kept on the body (BodyLight).
+/// all where these disagree. Light that bounces is kept on the body: the brighter lamp's by texels
+/// as fine as a third of a pixel (TexelLight), the other's by patches (BodyLight), and so is what
+/// has no texel yet. A target's first frame asks for its texels and is then made once more.
 /// The lattice is the same in each frame: what it gets wrong, below 1/64 of a cell on an edge,
 /// shows as no noise.
 ///
@@ -42,8 +44,9 @@ class LatticeRenderer final : public Renderer {
     std::uint32_t facet = 0;
     std::uint32_t points = 0;
     std::array<std::uint16_t, kMostCells> in_cell{};  // points
-    float sum_x = 0;                                  // of these, in steps from the pixel's corner
-    float sum_y = 0;
+    // Of these, in half steps from the pixel's corner.
+    std::array<std::uint16_t, kMostCells> sum_x{};
+    std::array<std::uint16_t, kMostCells> sum_y{};
   };
   /// Points of one facet in one cell, of which some are asked whether a lamp reaches them.
   struct Doubt {
@@ -95,12 +98,15 @@ class LatticeRenderer final : public Renderer {
   void light_up(const Snapshot& snapshot) noexcept;
   void shade_row(const Snapshot& snapshot, Radiance& out, int index) noexcept;
   [[nodiscard]] bool all_see(const Row& row, int column, std::uint32_t facet) const noexcept;
+  [[nodiscard]] Tone whole_pixel(std::uint32_t facet) const noexcept;
   void collect(const Row& row, int column) const noexcept;
   void add_run(const Row& row, std::size_t& last, std::uint32_t facet, int x, int y,
                int length) const noexcept;
-  void shade_pixel(const Row& row, int column) const noexcept;
-  void shade(const Row& row, int column, const Tone& tone) const noexcept;
-  [[nodiscard]] float bounced_by_paths(const Row& row, int column, const Tone& tone) const noexcept;
+  void shade_pixel(const Row& row, int column) noexcept;
+  void shade(const Row& row, int column, const Tone& tone) noexcept;
+  void add_bounced(const Row& row, int column, const Tone& tone,
+                   const SurfacePoint& middle) noexcept;
+  [[nodiscard]] float kept_by_patch(std::size_t lamp, const SurfacePoint& place) const noexcept;
   void add_lamp(const Row& row, int column, const Tone& tone, std::size_t lamp) const noexcept;
   void doubt(const Row& row, int column, const Tone& tone, std::size_t cell,
              std::size_t lamp) const noexcept;
@@ -116,14 +122,14 @@ class LatticeRenderer final : public Renderer {
   LatticeView view_;
   std::array<LampView, kLamps> lamp_views_;
   BodyLight body_light_;
-  BouncedLight bounced_paths_;
-  FacetNodes bounced_;  ///< what BodyLight sends to the camera
+  TexelLight texels_;  ///< of texel_lamp_
   PathTracer paths_;
   WorkerPool& pool_;
   std::vector<std::unique_ptr<Bench>> benches_;  ///< one a thread
   std::vector<RowCounts> row_counts_;            ///< by row of pixels
   // Of the frame in hand.
   std::array<Eigen::Vector3f, kLamps> toward_lamp_;
+  std::size_t texel_lamp_ = 0;  ///< the brighter one
 };
 
 }  // namespace engine

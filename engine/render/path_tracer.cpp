@@ -89,6 +89,10 @@ RenderReport PathTracer::render(const Snapshot& snapshot, Budget budget, Radianc
   report.add({"bounces", kNumbers[at(report.bounces)], spec_.bounces_left_out_e});
   if (out.region.empty()) return report;
   light_up(snapshot, report);
+  // Samples know the cap; what harmonics leave out they find.
+  const bool cap = frames_[0].lamps.earth != nullptr;
+  report.add({"earthshine", name_of(cap ? EarthshineModel::kCap : snapshot.earthshine_rung.model),
+              cap ? 0.0 : snapshot.earthshine_rung.error_e});
   std::fill(row_counts_.begin(), row_counts_.end(), RowCounts{});
   choose_samples(snapshot, budget, out.region);
   run_passes(snapshot, budget, start, out, report);

@@ -24,7 +24,6 @@ RenderSpec read_render(const ConfigTable& table) {
   spec.method = table.choice_or<RenderMethod>(
       "method", "paths", {{"lattice", RenderMethod::kLattice}, {"paths", RenderMethod::kPaths}});
   spec.lattice_side = table.choice_or<int>("lattice", "8x8", {{"8x8", 8}, {"4x4", 4}, {"2x2", 2}});
-  spec.bounce_paths = static_cast<int>(table.integer_or("bounce_paths", 64, between(0, 4096)));
   spec.profile = table.choice_or<RenderProfile>(
       "profile", "default",
       {{"default", {0.3, 0.19}}, {"reference", {0.1, 0.063}}, {"preview", {1.0, 0.63}}});

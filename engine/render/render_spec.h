@@ -35,8 +35,9 @@ struct RenderProfile {
 
 struct RenderSpec {
   RenderMethod method = RenderMethod::kPaths;
-  int lattice_side = 8;   ///< lattice: points on a side of a cell: 2, 4 or 8
-  int bounce_paths = 64;  ///< lattice: paths a pixel that follow bounces in corners
+  int lattice_side = 8;  ///< lattice: points on a side of a cell: 2, 4 or 8
+  /// Lattice: what is kept on the body is complete in each frame, whatever that takes.
+  bool settled = false;
   RenderProfile profile;
   int samples_per_pixel = 50;    ///< paths: shared by the cells of a pixel, rounded up; 0: as the
                                  ///< profile asks

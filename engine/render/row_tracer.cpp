@@ -19,7 +19,7 @@ std::size_t at(int i) noexcept { return static_cast<std::size_t>(i); }
 
 TracedFrame::TracedFrame(const BodyView& view, const CameraGeometry& camera,
                          double bounding_radius_m, double sun_radius_rad) noexcept
-    : lamps(lamp_cones(view, sun_radius_rad)), origin(view.camera.m) {
+    : lamps(lamps_with_cap(view, sun_radius_rad)), origin(view.camera.m) {
   const Matrix3d& axes = view.body_from_camera.matrix;
   at_zero = axes * camera.direction_at({0.0, 0.0});
   per_u = axes.col(0) * camera.ifov_rad();
@@ -56,8 +56,12 @@ void RowTracer::trace(int column, PixelPoint pixel, std::span<const std::uint32_
                       int last) noexcept {
   const int cells = side_ * side_;
   // In 2^-32, so that no rounding makes the share another one.
-  const auto share = static_cast<std::uint64_t>(
-      std::llround(0x1p32 * (bounced_[0].bounces() > 0 ? rules_.bounce_share : 0.0)));
+  const auto last_body = frames_->begin() + static_cast<std::ptrdiff_t>(bodies_.count());
+  const bool follows = bounced_[0].bounces() > 0 ||
+                       std::any_of(frames_->begin(), last_body,
+                                   [](const auto& frame) { return frame.lamps.earth != nullptr; });
+  const auto share =
+      static_cast<std::uint64_t>(std::llround(0x1p32 * (follows ? rules_.bounce_share : 0.0)));
   CameraQueue& q = camera_;
   for (int r = 0; r < replicates_; ++r) {
     const std::uint32_t key = keys[at(r)];
@@ -173,6 +177,7 @@ void RowTracer::take_hits(std::size_t body, const Look& look, std::size_t used) 
   const RayPacket& rays = look.rays;
   Desk& desk = desks_[body];
   const std::size_t cells = body > 0 ? companions_cells() : 0;
+  const bool earth = (*frames_)[body].lamps.earth != nullptr;
   std::array<SurfacePoint, kLanes> points;
   bool any = false;
   for (std::size_t i = 0; i < used; ++i) {
@@ -183,12 +188,17 @@ void RowTracer::take_hits(std::size_t body, const Look& look, std::size_t used) 
     const Vector3f direction(rays.direction_x[i], rays.direction_y[i], rays.direction_z[i]);
     points[i] = bodies_.facets(body).at(look.hits[i], direction);
     if (camera_.bouncing[i] < 0) continue;
-    desk.waiting[desk.paths++] = {{points[i], direction.normalized(),
-                                   SampleNumbers(rules_.sequence, camera_.key[i],
-                                                 static_cast<std::uint32_t>(camera_.bouncing[i]))},
-                                  slot_at(body, i)};
+    desk.waiting[desk.paths] = {{points[i], direction.normalized(),
+                                 SampleNumbers(rules_.sequence, camera_.key[i],
+                                               static_cast<std::uint32_t>(camera_.bouncing[i]))},
+                                slot_at(body, i)};
+    if (earth)
+      desk.waiting[desk.paths].path.earth_asked = static_cast<float>(1.0 / rules_.bounce_share);
+    ++desk.paths;
   }
-  if (any) light_directly(body, points, look.hits);
+  if (!any) return;
+  light_directly(body, points, look.hits);
+  if (earth) light_by_earth(body, rays, points, look.hits);
 }
 
 void RowTracer::light_directly(std::size_t body, const std::array<SurfacePoint, kLanes>& points,
@@ -213,6 +223,25 @@ void RowTracer::light_directly(std::size_t body, const std::array<SurfacePoint, 
       ask(body, desks_[body].direct[k], RayCoherence::kParallel, counts_[1], points[i], way,
           slot_at(body, i), static_cast<double>(light));
     }
+  }
+}
+
+/// Every sample asks for it once; those that follow a bounce may run into it as well.
+void RowTracer::light_by_earth(std::size_t body, const RayPacket& rays,
+                               const std::array<SurfacePoint, kLanes>& points,
+                               const std::array<MeshHit, kLanes>& hits) noexcept {
+  SampleLanes lanes;
+  lanes.pairs(rules_.sequence, camera_.key, camera_.sample, BouncedLight::kDirectEarth);
+  for (std::size_t i = 0; i < kLanes; ++i) {
+    if (hits[i].triangle == MeshHit::kNone) continue;
+    const EarthLight::Sample sample = (*frames_)[body].lamps.earth->sample(
+        static_cast<double>(lanes.first[i]), static_cast<double>(lanes.second[i]));
+    const Vector3f direction(rays.direction_x[i], rays.direction_y[i], rays.direction_z[i]);
+    const double light = bounced_[body].earthshine(sample, points[i], direction.normalized(),
+                                                   1.0 / rules_.bounce_share);
+    if (light > 0.0)
+      ask(body, desks_[body].direct[1], RayCoherence::kScattered, counts_[1], points[i],
+          sample.direction.cast<float>(), slot_at(body, i), light);
   }
 }
 
@@ -273,6 +302,7 @@ void RowTracer::bounce(std::size_t body, std::size_t count) noexcept {
           bounced_[body].escaped((*frames_)[body].lamps, w.path) / rules_.bounce_share;
       continue;
     }
+    if (bounced_[there].longest(w.path)) continue;
     if (there != body) w.path.direction = bodies_.turned(body, there, w.path.direction);
     const BouncedLight::Question question = bounced_[there].arrive(
         (*frames_)[there].lamps, w.path, bodies_.facets(there).at(met.hit[i], w.path.direction));
@@ -280,7 +310,7 @@ void RowTracer::bounce(std::size_t body, std::size_t count) noexcept {
       ask(there, desks_[there].bounced_shadow, RayCoherence::kScattered, counts_[3], w.path.from,
           question.toward, w.slot, question.light_w_m2_sr / rules_.bounce_share);
     }
-    if (!bounced_[there].longest(w.path)) desks_[there].waiting[desks_[there].paths++] = w;
+    if (bounced_[there].may_go_on(w.path)) desks_[there].waiting[desks_[there].paths++] = w;
   }
 }
 
@@ -288,9 +318,12 @@ void RowTracer::finish() noexcept {
   if (camera_.used > 0) send_camera_rays();
   bounce_all_from(1);
   for (std::size_t body = 0; body < desks_.size(); ++body) {
-    for (ShadowQueue& queue : desks_[body].direct)
-      send(body, queue, RayCoherence::kParallel, counts_[1]);
-    send(body, desks_[body].bounced_shadow, RayCoherence::kScattered, counts_[3]);
+    Desk& desk = desks_[body];
+    const bool earth = (*frames_)[body].lamps.earth != nullptr;
+    send(body, desk.direct[0], RayCoherence::kParallel, counts_[1]);
+    send(body, desk.direct[1], earth ? RayCoherence::kScattered : RayCoherence::kParallel,
+         counts_[1]);
+    send(body, desk.bounced_shadow, RayCoherence::kScattered, counts_[3]);
   }
 }
 

@@ -131,6 +131,9 @@ class RowTracer {
   void take_hits(std::size_t body, const Look& look, std::size_t used) noexcept;
   void light_directly(std::size_t body, const std::array<SurfacePoint, kLanes>& points,
                       const std::array<MeshHit, kLanes>& hits) noexcept;
+  void light_by_earth(std::size_t body, const RayPacket& rays,
+                      const std::array<SurfacePoint, kLanes>& points,
+                      const std::array<MeshHit, kLanes>& hits) noexcept;
   /// Light of a camera's sample that meets this body first.
   [[nodiscard]] std::uint32_t slot_at(std::size_t body, std::size_t lane) const noexcept {
     return camera_.slot[lane] +

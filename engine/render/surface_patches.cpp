@@ -22,9 +22,6 @@ constexpr int kMostRounds = 16;
 const float kOneWay = std::cos(static_cast<float>(10.0 * kDegree));
 // What a place may be turned from its patch.
 constexpr float kSameWay = 0.5F;
-// Patches of one smooth surface: how far they are turned, and how far off its plane, in cubes.
-const float kSmooth = std::cos(static_cast<float>(15.0 * kDegree));
-constexpr float kOffPlane = 0.15F;
 constexpr int kPatchesAShare = 64;
 
 /// Fractional parts of multiples: R2 (Roberts 2018), from a start that `index` and `who` choose.
@@ -202,10 +199,7 @@ void SurfacePatches::trace(const TracedTarget& target, WorkerPool& pool) {
         std::uint32_t& link = links_[p * kRays + ray_of[l]];
         link = kSky;
         if (hits[l].triangle == MeshHit::kNone) continue;
-        const SurfacePoint hit = target.facets.at(hits[l], d);
-        link = at(hit);
-        const Vector3f from(packet.origin_x[l], packet.origin_y[l], packet.origin_z[l]);
-        if ((hit.place - from).norm() * grid_.per_m < 1.0F) patches_[p].near_share += 1.0F / kRays;
+        link = at(target.facets.at(hits[l], d));
       }
       packet = {};
       lanes = 0;
@@ -232,55 +226,17 @@ void SurfacePatches::trace(const TracedTarget& target, WorkerPool& pool) {
   });
 }
 
-std::uint32_t SurfacePatches::best_in(std::size_t cube, const SurfacePoint& place, float least_same,
-                                      float most_off_plane) const noexcept {
+std::uint32_t SurfacePatches::at(const SurfacePoint& place) const noexcept {
   std::uint32_t best = kNone;
+  float least_same = kSameWay;
+  const std::size_t cube = grid_.cube_of(place.place);
   for (std::uint32_t p = first_in_cube_[cube]; p < first_in_cube_[cube + 1]; ++p) {
     const Patch& patch = patches_[p];
     const float same = patch.normal.dot(place.normal);
-    const float off = std::abs(place.normal.dot(patch.place - place.place)) * grid_.per_m;
-    if (same <= least_same || off > most_off_plane || patch.material != place.material) continue;
+    if (same <= least_same || patch.material != place.material) continue;
     least_same = same;
     best = p;
   }
-  return best;
-}
-
-SurfacePatches::Around SurfacePatches::around(const SurfacePoint& place) const noexcept {
-  Around around;
-  const std::uint32_t own = at(place);
-  if (own == kNone) return around;
-  around.crowded = patches_[own].crowded();
-  if (around.crowded) return around;
-  const Vector3f cell = (place.place - grid_.low) * grid_.per_m - Vector3f::Constant(0.5F);
-  float total = 0.0F;
-  for (std::size_t corner = 0; corner < around.patch.size(); ++corner) {
-    Vector3f middle;
-    float weight = 1.0F;
-    for (int k = 0; k < 3; ++k) {
-      const float low = std::floor(cell[k]);
-      const bool upper = (corner >> k & 1U) != 0;
-      middle[k] = grid_.low[k] + (low + (upper ? 1.5F : 0.5F)) / grid_.per_m;
-      weight *= upper ? cell[k] - low : 1.0F - (cell[k] - low);
-    }
-    const std::uint32_t p = best_in(grid_.cube_of(middle), place, kSmooth, kOffPlane);
-    if (p == kNone || patches_[p].crowded()) continue;
-    around.patch[corner] = p;
-    around.weight[corner] = weight;
-    total += weight;
-  }
-  if (total > 0.0F) {
-    for (float& w : around.weight) w /= total;
-  } else {
-    around.patch[0] = own;
-    around.weight[0] = 1.0F;
-  }
-  return around;
-}
-
-std::uint32_t SurfacePatches::at(const SurfacePoint& place) const noexcept {
-  constexpr float kAnywhere = std::numeric_limits<float>::infinity();
-  std::uint32_t best = best_in(grid_.cube_of(place.place), place, kSameWay, kAnywhere);
   if (best != kNone) return best;
   // A corner of the surface that no ray found: the nearest patch in the cubes around.
   float nearest = std::numeric_limits<float>::infinity();

@@ -22,8 +22,7 @@ class SurfacePatches {
  public:
   static constexpr std::uint32_t kNone = 0xFFFFFFFFU;  ///< no patch: nothing is known, so dark
   static constexpr std::uint32_t kSky = 0xFFFFFFFEU;   ///< a ray that leaves the target
-  static constexpr float kCrowded = 0.03F;
-  static constexpr std::size_t kPoints = 8;  ///< of a patch, that stand for it
+  static constexpr std::size_t kPoints = 8;            ///< of a patch, that stand for it
   static constexpr std::size_t kRaysABin = 8;
   static constexpr std::size_t kRays = HemisphereBins::kBins * kRaysABin;
 
@@ -32,9 +31,6 @@ class SurfacePatches {
     Eigen::Vector3f normal = Eigen::Vector3f::UnitZ();   ///< mean, unit
     Eigen::Matrix3f axes = Eigen::Matrix3f::Identity();  ///< rows: x, y, normal
     std::uint32_t material = 0;
-    float near_share = 0;  ///< of its rays, those that end nearer than a cube is wide
-    /// Light changes over less than the patch where surfaces stand close together.
-    [[nodiscard]] bool crowded() const noexcept { return near_share > kCrowded; }
     std::array<SurfacePoint, kPoints> points{};
   };
 
@@ -46,14 +42,6 @@ class SurfacePatches {
   /// The patch of a place; kNone when none is near that faces the same way.
   [[nodiscard]] std::uint32_t at(const SurfacePoint& place) const noexcept;
 
-  /// The patches round a place on one smooth surface with it that are not crowded; those without
-  /// weight are 0.
-  struct Around {
-    bool crowded = false;  ///< there are none, for the place's own is
-    std::array<std::uint32_t, 8> patch{};
-    std::array<float, 8> weight{};  ///< linear in the place, 1 in all; 0 where nothing is known
-  };
-  [[nodiscard]] Around around(const SurfacePoint& place) const noexcept;
   [[nodiscard]] float cube_m() const noexcept { return 1.0F / grid_.per_m; }
 
   /// By ray, kRaysABin to a bin: the patch that it meets, kNone or kSky.
@@ -72,8 +60,6 @@ class SurfacePatches {
 
   void find(const TracedTarget& target);
   void trace(const TracedTarget& target, WorkerPool& pool);
-  [[nodiscard]] std::uint32_t best_in(std::size_t cube, const SurfacePoint& place, float least_same,
-                                      float most_off_plane) const noexcept;
 
   Grid grid_;
   std::vector<std::uint32_t> first_in_cube_;  ///< by cube, and one more

@@ -11,14 +11,12 @@
 namespace engine {
 namespace {
 
-constexpr std::int32_t kStep = 16;  // sixteenths
+constexpr std::int32_t kStep = TriangleRaster::kStep;
+constexpr auto& kPlaceInStep = TriangleRaster::kPlaceInStep;
 // Corners within this many sixteenths: what an edge changes by over kLanes steps and kMostBandRows
 // rows stays below 2^30.
 constexpr double kLimit = 1 << 19;
 constexpr std::int64_t kFar = 1 << 30;
-
-// Bit reversal of 0..7, at the middle of eighths, in sixteenths.
-constexpr std::array<std::int32_t, 8> kPlaceInStep = {1, 9, 5, 13, 3, 11, 7, 15};
 
 struct EdgeFunction {
   std::int64_t at_zero = 0;  // >= 0 inside
@@ -136,11 +134,6 @@ const Cover kCover = best_cover();
 int floor_div(std::int32_t a, int b) noexcept { return (a >= 0 ? a : a - (b - 1)) / b; }
 
 }  // namespace
-
-float TriangleRaster::x_in_step(int j) noexcept {
-  return static_cast<float>(kPlaceInStep[static_cast<std::size_t>(j % kPeriod)]) / kStep;
-}
-float TriangleRaster::y_in_step(int i) noexcept { return x_in_step(i); }
 
 TriangleRaster::TriangleRaster(std::size_t vertices, std::size_t triangles, int most_bands)
     : places_(vertices), sorted_(triangles), most_bands_(most_bands) {

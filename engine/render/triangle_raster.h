@@ -25,6 +25,9 @@ class TriangleRaster {
   static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
   /// Of the patterns that point places repeat in.
   static constexpr int kPeriod = 8;
+  static constexpr std::int32_t kStep = 16;  ///< sixteenths
+  /// Bit reversal of 0..7, at the middle of eighths, in sixteenths.
+  static constexpr std::array<std::int32_t, kPeriod> kPlaceInStep = {1, 9, 5, 13, 3, 11, 7, 15};
   static constexpr int kLanes = 16;
   static constexpr int kMostBandRows = 32;
 
@@ -34,8 +37,10 @@ class TriangleRaster {
     double nearness = 0;
   };
   /// Where a point lies in its step; both in (0, 1).
-  [[nodiscard]] static float x_in_step(int j) noexcept;
-  [[nodiscard]] static float y_in_step(int i) noexcept;
+  [[nodiscard]] static float x_in_step(int j) noexcept {
+    return static_cast<float>(kPlaceInStep[static_cast<std::size_t>(j % kPeriod)]) / kStep;
+  }
+  [[nodiscard]] static float y_in_step(int i) noexcept { return x_in_step(i); }
 
   TriangleRaster(std::size_t vertices, std::size_t triangles, int most_bands);
 

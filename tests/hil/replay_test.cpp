@@ -9,10 +9,12 @@
 
 #include <gtest/gtest.h>
 
+#include "engine/render/path_tracer.h"
 #include "hil/closed_loop_pointing.h"
 #include "hil/no_commands.h"
 #include "hil/recorder.h"
 #include "tests/support/fakes.h"
+#include "tests/support/scenes.h"
 #include "tests/support/temp_file.h"
 
 namespace {
@@ -312,6 +314,125 @@ TEST(Replay, AnotherDecisionMakesOtherBits) {
   // A dropped frame asks the pointing once, a skipped one never.
   skipped.decisions.due.erase(dropped, skipped.decisions.due.end() - 20);
   EXPECT_TRUE(differs(skipped)) << "dropped frames taken for skipped ones";
+}
+
+/// The render's stopwatch: each look moves it on.
+Duration g_stopwatch{};
+Duration g_step{};
+Duration ticking() noexcept { return g_stopwatch += g_step; }
+
+/// A corner of two plates by the path tracer, its light in the pixels. Before each frame the
+/// machine gets slower or faster.
+class TracingGenerator final : public engine::SceneGenerator {
+ public:
+  explicit TracingGenerator(Duration (*clock)() noexcept)
+      : pool_(1), tracer_(spec(clock), target(), pool_) {}
+
+  engine::FrameReport expose(const engine::Shot& shot, engine::Budget budget, engine::DnImage& out,
+                             engine::TruthMask& /*mask*/) noexcept override {
+    budgets.push_back(budget);
+    g_step = Duration(100'000) * (std::int64_t{1} << (shot.sequence * 5 % 7));
+    engine::Snapshot snapshot = test_support::look_at_origin({136e3, 34e3, 85e3}, {0, 0, 1});
+    snapshot.sun = {engine::direction_of<engine::BodyFrame>({-0.2, 0.3, 1}), 600.0};
+    snapshot.sequence = shot.sequence;
+    engine::FrameReport report;
+    report.render = tracer_.render(snapshot, budget, light_);
+    std::size_t i = 0;
+    for (std::uint16_t& dn : out.pixels()) {
+      // All bits of four cells of each pixel.
+      std::uint32_t bits = 0;
+      for (int k = 0; k < 4 && i < light_.grid.pixels().size(); ++k)
+        bits = bits * 31 + std::bit_cast<std::uint32_t>(light_.grid.pixels()[i++]);
+      dn = static_cast<std::uint16_t>(bits ^ bits >> 16U);
+    }
+    return report;
+  }
+  std::vector<engine::Budget> budgets;
+
+ private:
+  static engine::RenderSpec spec(Duration (*clock)() noexcept) {
+    engine::RenderSpec spec;
+    spec.camera = test_support::small_camera(32);
+    spec.grid.beyond_frame_px = 0;
+    spec.samples_per_pixel = 576;  // passes of 1, 1, 2, 4, 8, 16
+    spec.clock = clock;
+    return spec;
+  }
+  static std::shared_ptr<engine::TracedTarget> target() {
+    engine::Mesh mesh;
+    test_support::add_plate(mesh, "grey", {0, -3, 0}, {4, 0, 0}, {0, 6, 0});
+    test_support::add_plate(mesh, "grey", {0, -3, 0}, {0, 6, 0}, {0, 0, 3});
+    return std::make_shared<engine::TracedTarget>(
+        mesh, std::vector<engine::Material>{test_support::lambert_material("grey", 0.5)});
+  }
+  engine::WorkerPool pool_;
+  engine::PathTracer tracer_;
+  engine::Radiance light_;
+};
+
+TEST(Replay, FramesThatADeadlineStoppedComeBackBitForBit) {
+  constexpr std::uint64_t kFrames = 21;
+  const TempFile file("record.slog");
+  hil::LogStart start;
+  start.loop = small_loop(kFrames);
+  start.loop.width_px = 48;
+  start.loop.height_px = 48;
+  start.loop.when_busy = WhenBusy::kWait;
+  start.loop.render_time = Duration(20'000'000);
+  hil::ManualClock clock(kStart - kPeriod);
+  SlowPointing pointing;
+  TracingGenerator generator(&ticking);
+  Recorder recorder({.log_path = file.path(), .when_busy = WhenBusy::kWait}, start, nullptr);
+  fakes::Sink sink(
+      [&](const Frame& frame, Duration timeout) { return recorder.send(frame, timeout); });
+  hil::NoCommands source;
+  auto loop = std::make_unique<FrameLoop>(start.loop, clock, pointing, generator, sink, source);
+  {
+    const Watched watched(*loop, recorder);
+    static_cast<void>(recorder.finish(loop->run({})));
+  }
+  for (const engine::Budget& budget : generator.budgets) {
+    EXPECT_EQ(budget.time, start.loop.render_time);
+    EXPECT_EQ(budget.passes, 0);
+  }
+
+  const Recording log = hil::load_recording(file.path());
+  ASSERT_EQ(log.decisions.due.size(), kFrames);
+  ASSERT_EQ(log.frames.size(), kFrames);
+  const auto [least, most] = std::ranges::minmax_element(
+      log.decisions.due, {}, [](const hil::Decisions::Due& d) { return d.passes; });
+  EXPECT_LT(least->passes, 4);
+  EXPECT_EQ(most->passes, 6);
+
+  // Once as it was, on a machine without a clock; once with three passes each.
+  for (const bool as_it_was : {true, false}) {
+    Recording told = log;
+    if (!as_it_was) {
+      for (hil::Decisions::Due& d : told.decisions.due) d.passes = 3;
+    }
+    LoopSpec spec = log.start.loop;
+    spec.replay = &told.decisions;
+    spec.when_busy = WhenBusy::kWait;
+    hil::ManualClock other_clock(spec.start - spec.period);
+    SlowPointing other_pointing;
+    TracingGenerator again(nullptr);
+    std::size_t equal = 0;
+    fakes::Sink comparison([&](const Frame& frame, Duration) -> engine::Status {
+      const hil::LogFrame now = hil::log_frame(frame);
+      equal += now.pixels_crc32c == log.frames[frame.sequence].pixels_crc32c ? 1U : 0U;
+      return engine::Done{};
+    });
+    auto replay =
+        std::make_unique<FrameLoop>(spec, other_clock, other_pointing, again, comparison, source);
+    static_cast<void>(replay->run({}));
+    for (std::size_t i = 0; i < kFrames; ++i) {
+      EXPECT_EQ(again.budgets[i].passes, told.decisions.due[i].passes);
+      EXPECT_EQ(again.budgets[i].time, Duration{});
+    }
+    const auto of_three = static_cast<std::size_t>(std::ranges::count(
+        log.decisions.due, 3, [](const hil::Decisions::Due& d) { return d.passes; }));
+    EXPECT_EQ(equal, as_it_was ? kFrames : of_three);
+  }
 }
 
 }  // namespace

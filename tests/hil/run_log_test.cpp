@@ -159,6 +159,30 @@ TEST(RunLog, CommandsComeBackToTheLastBit) {
   }
 }
 
+TEST(RunLog, PassesOfAFrameThatAClockStoppedComeBack) {
+  const TempFile file("passes.slog");
+  LogDecision timed = decided(1);
+  timed.kind = LogDecision::Kind::kExposedInPasses;
+  timed.passes = 5;
+  LogDecision without = decided(3);
+  without.kind = LogDecision::Kind::kExposedInPasses;
+  {
+    RawLog log(file.path(), Duration{});
+    append(log, LogType::kStart, small_start());
+    append(log, LogType::kDecision, decided(0));
+    append(log, LogType::kDecision, timed);
+    append(log, LogType::kDecision, decided(2, false));
+    append(log, LogType::kDecision, without);  // it says that there are some, and has none
+  }
+  const Recording got = hil::load_recording(file.path());
+  EXPECT_EQ(got.fault.find("a record that makes no sense"), 0U) << got.fault;
+  ASSERT_EQ(got.decisions.due.size(), 3U);
+  EXPECT_EQ(got.decisions.due[0].passes, 0);
+  EXPECT_TRUE(got.decisions.due[1].exposed);
+  EXPECT_EQ(got.decisions.due[1].passes, 5);
+  EXPECT_FALSE(got.decisions.due[2].exposed);
+}
+
 TEST(RunLog, FramesDecisionsAndTheEndComeBack) {
   const TempFile file("all.slog");
   LogFrame frame;
@@ -232,7 +256,7 @@ TEST(RunLog, RecordsThatMakeNoSenseEndTheReading) {
       {"a decision of a later kind",
        [](RawLog& log) {
          LogDecision d = decided(9);
-         d.kind = static_cast<LogDecision::Kind>(3);
+         d.kind = static_cast<LogDecision::Kind>(4);
          append(log, LogType::kDecision, d);
        },
        "a record that makes no sense"},

@@ -32,6 +32,12 @@ class Rig {
         link_({.name = name_, .when_full = drivers::WhenFull::kWait}, kSide_px, kSide_px) {}
 
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
+  /// Before the Earth a target may be a hole in the light.
+  void brighten_sky() noexcept {
+    sky_dn_ = 300.0;
+    sky_noise_dn_ = 4.0;
+    target_dn_ = -280.0;
+  }
 
   /// How far from the middle the target was seen, frame by frame, px.
   std::vector<double> run(std::uint64_t frames, bool with_target) {
@@ -71,12 +77,13 @@ class Rig {
   }
 
   void draw(const std::array<double, 2>& from_middle_px, bool with_target) {
-    std::normal_distribution<double> noise(20.0, 1.0);
+    std::normal_distribution<double> noise(sky_dn_, sky_noise_dn_);
     for (int v = 0; v < kSide_px; ++v) {
       for (int u = 0; u < kSide_px; ++u) {
         const double du = u - kSide_px / 2 - from_middle_px[0];
         const double dv = v - kSide_px / 2 - from_middle_px[1];
-        const double target = with_target ? 900.0 * std::exp(-(du * du + dv * dv) / 18.0) : 0.0;
+        const double target =
+            with_target ? target_dn_ * std::exp(-(du * du + dv * dv) / 18.0) : 0.0;
         pixels_.at(u, v) =
             static_cast<std::uint16_t>(std::lround(std::max(0.0, noise(random_) + target)));
       }
@@ -87,6 +94,9 @@ class Rig {
   drivers::ShmLink link_;
   engine::DnImage pixels_{kSide_px, kSide_px};
   hil::Command last_;
+  double sky_dn_ = 20.0;
+  double sky_noise_dn_ = 1.0;
+  double target_dn_ = 900.0;
   std::mt19937 random_{1};
 };
 
@@ -95,15 +105,17 @@ std::vector<std::string> environment() {
           "STARLOOP_CLIENT_LIBRARY=" STARLOOP_CLIENT_LIBRARY, "PYTHONDONTWRITEBYTECODE=1"};
 }
 
-void expect_holds_the_target(std::vector<std::string> words) {
+void expect_holds_the_target(std::vector<std::string> words, bool before_the_earth = false) {
   constexpr std::uint64_t kFrames = 40;
   auto rig = std::make_unique<Rig>();
+  if (before_the_earth) rig->brighten_sky();
   words.push_back(rig->name());
   words.push_back(std::to_string(kIfov_rad * 1e6) + "e-6");
   Process example(words, environment());
   const std::vector<double> error_px = rig->run(kFrames, true);
   ASSERT_EQ(error_px.size(), kFrames);
   EXPECT_GT(error_px.front(), 20.0);
+  // Before the Earth 16 000 DN under 4 DN of noise: 0.06 px, after the filter's rate 0.08.
   // The spot's 50 000 DN under 1 DN of noise over some 500 px: its centroid is good to 0.005 px,
   // and the rate that an alpha-beta filter makes of it to the same over a frame. 0.2 px is far
   // over both and a fifteenth of what the target moves in a frame.
@@ -127,6 +139,12 @@ void expect_reports_an_empty_sky(std::vector<std::string> words) {
 }
 
 TEST(Examples, TheOneInCHoldsTheTarget) { expect_holds_the_target({STARLOOP_EXAMPLE_C}); }
+TEST(Examples, TheOneInCHoldsADarkTargetBeforeTheEarth) {
+  expect_holds_the_target({STARLOOP_EXAMPLE_C}, true);
+}
+TEST(Examples, TheOneWithOpenCvHoldsADarkTargetBeforeTheEarth) {
+  expect_holds_the_target({STARLOOP_EXAMPLE_OPENCV}, true);
+}
 TEST(Examples, TheOneInCReportsAnEmptySky) { expect_reports_an_empty_sky({STARLOOP_EXAMPLE_C}); }
 TEST(Examples, TheOneWithOpenCvHoldsTheTarget) {
   expect_holds_the_target({STARLOOP_EXAMPLE_OPENCV});
@@ -137,6 +155,10 @@ TEST(Examples, TheOneWithOpenCvReportsAnEmptySky) {
 #ifdef STARLOOP_PYTHON
 TEST(Examples, TheOneInPythonHoldsTheTarget) {
   expect_holds_the_target({STARLOOP_PYTHON, STARLOOP_SOURCE_DIR "/tools/examples/tracker.py"});
+}
+TEST(Examples, TheOneInPythonHoldsADarkTargetBeforeTheEarth) {
+  expect_holds_the_target({STARLOOP_PYTHON, STARLOOP_SOURCE_DIR "/tools/examples/tracker.py"},
+                          true);
 }
 TEST(Examples, TheOneInPythonReportsAnEmptySky) {
   expect_reports_an_empty_sky({STARLOOP_PYTHON, STARLOOP_SOURCE_DIR "/tools/examples/tracker.py"});

@@ -30,7 +30,7 @@ starloop::Scenario small_scenario(const std::string& what) {
                        "camera.pixel_pitch_um=13",
                        "optics.aperture_m=0.18",
                        "render.samples_per_pixel=4",
-                       "render.method=" + method,
+                       "render.method=" + method.substr(0, method.find('_')),
                        "optics.largest_wing_px=16",
                        "guidance.error_x_urad=5",
                        "guidance.error_growth_x_urad_s=1",
@@ -60,7 +60,9 @@ struct Outcome {
 class Bench {
  public:
   explicit Bench(const std::string& method)
-      : scenario_(small_scenario(method)), rig_(scenario_, 2) {
+      : scenario_(small_scenario(method)),
+        rig_(scenario_, 2),
+        deadline_(method.ends_with("_deadline") ? Duration(1'000'000) : Duration{}) {
     pass_ = starloop::passes_of(scenario_)[scenario_.run.pass - 1];
   }
 
@@ -78,6 +80,7 @@ class Bench {
     spec.width_px = scenario_.scene.camera.width_px;
     spec.height_px = scenario_.scene.camera.height_px;
     spec.bits = scenario_.detector.bits;
+    spec.render_time = deadline_;
     drivers::MockLink link(spec.width_px, spec.height_px);
     hil::ClosedLoopPointing pointing = starloop::make_pointing(scenario_, rig_, spec.start);
     hil::ManualClock clock(spec.start - spec.period);
@@ -128,6 +131,7 @@ class Bench {
 
   starloop::Scenario scenario_;
   starloop::Rig rig_;
+  Duration deadline_;
   engine::Pass pass_;
 };
 
@@ -190,6 +194,6 @@ TEST_P(LoopAllocation, FiveHundredFramesTakeNoMoreFromTheHeapThanTen) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Methods, LoopAllocation,
-                         testing::Values("paths", "lattice", "companions"));
+                         testing::Values("paths", "paths_deadline", "lattice", "companions"));
 
 }  // namespace

@@ -99,6 +99,20 @@ TEST(StarloopReplay, ARunInRealTimeComesBackToTheBitOnAnyNumberOfThreads) {
   }
 }
 
+TEST(StarloopReplay, FramesThatADeadlineStoppedComeBackToTheBit) {
+  const Recorded run({"run.duration_s=1", "record.frames=none", "render.samples_per_pixel=400",
+                      "render.deadline_ms=2"});
+  ASSERT_EQ(run.run.exit_code, kGood) << run.run.err;
+  const hil::Recording log = hil::load_recording(run.log());
+  // However many the machine had time for, each exposed frame of a target says so.
+  EXPECT_TRUE(std::ranges::any_of(log.decisions.due, [](const auto& d) { return d.exposed; }));
+  for (const hil::Decisions::Due& d : log.decisions.due) {
+    EXPECT_EQ(d.passes > 0, d.exposed);
+  }
+  const std::string n = std::to_string(log.frames.size());
+  EXPECT_EQ(replay(run.folder()).out, n + " of " + n + " frames equal\n");
+}
+
 TEST(StarloopReplay, LockstepComesBackAndItsPicturesToo) {
   const Recorded run({"run.clock=lockstep", "run.duration_s=0.5", "run.record_every=1"});
   ASSERT_EQ(run.run.exit_code, kGood) << run.run.err;

@@ -181,6 +181,9 @@ const std::vector<BadValue> kBadValues = {
     {"sky.radiance_w_m2_sr=-1e-9", "sky.radiance_w_m2_sr", "must be >= 0"},
     {"render.samples_per_pixel=0", "render.samples_per_pixel", "got 0"},
     {"render.samples_per_pixel=many", "render.samples_per_pixel", "\"auto\", got \"many\""},
+    {"render.deadline_ms=0", "render.deadline_ms", "got 0"},
+    {"render.deadline_ms=101", "render.deadline_ms", "must be >= 0.1 and <= 100"},
+    {"render.deadline_ms=never", "render.deadline_ms", "\"none\", got \"never\""},
     {"render.bounces=17", "render.bounces", "got 17"},
     {"render.bounces=all", "render.bounces", "\"auto\", got \"all\""},
     {"render.profile=best", "render.profile", "got \"best\""},
@@ -212,6 +215,26 @@ TEST(Scenario, RenderReadsWhatItIsToldAndWhatItIsToFindOut) {
   EXPECT_EQ(plain.render.samples_per_pixel, 50);
   EXPECT_FALSE(plain.render.bounces_by_need);
   EXPECT_EQ(plain.render.profile.rho_mc, 0.19);
+}
+
+TEST(Scenario, OnlyARunInRealTimeByPathsHasADeadlineForItsRendering) {
+  EXPECT_EQ(load({}).run.render_time, engine::Duration{});
+  EXPECT_EQ(load({"render.deadline_ms=none"}).run.render_time, engine::Duration{});
+  EXPECT_EQ(load({"render.deadline_ms=12.5"}).run.render_time, engine::Duration(12'500'000));
+  for (const char* clock : {"lockstep", "as-fast-as-possible", "triggered"}) {
+    const auto said = complaint([&] {
+      static_cast<void>(load({std::string("run.clock=") + clock, "render.deadline_ms=20"}));
+    });
+    EXPECT_EQ(said.value_or(""),
+              "--set render.deadline_ms=20: render.deadline_ms needs run.clock = \"realtime\": no "
+              "other run asks a clock");
+  }
+  const auto said = complaint([] {
+    static_cast<void>(load({"render.method=lattice", "render.deadline_ms=20"}));
+  });
+  EXPECT_EQ(said.value_or(""),
+            "--set render.deadline_ms=20: render.deadline_ms needs render.method = \"paths\": no "
+            "other stops half-way");
 }
 
 TEST(Scenario, ABadOverrideIsAConfigErrorThatQuotesItAndNamesTheKey) {

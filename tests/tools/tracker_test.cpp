@@ -268,4 +268,125 @@ TEST(Tracker, ReportsOnlyMeansThatItAsksForNothing) {
   }
 }
 
+/// A sky like the Earth's, brighter by slope_dn with each pixel to the right, with its shot noise;
+/// before it, a target 40 px long: three quarters send 20 DN, the last 900.
+struct BrightScene {
+  double sky_dn = 250;
+  double slope_dn = 0;
+  PixelPoint corner{40, 50};
+  bool with_target = true;
+
+  [[nodiscard]] engine::DnImage image(unsigned seed) const {
+    engine::DnImage image(kSide_px, kSide_px);
+    std::mt19937 random(seed);
+    std::normal_distribution<double> noise(0.0, 1.0);
+    for (int v = 0; v < kSide_px; ++v) {
+      for (int u = 0; u < kSide_px; ++u) {
+        const double sky = sky_dn + slope_dn * (u - kCentre_px);
+        const double light = with_target ? (1.0 - cover(u, v)) * sky + own_light(u, v) : sky;
+        const double dn = light + noise(random) * std::sqrt(0.1 + light / 14.65);
+        image.at(u, v) = static_cast<std::uint16_t>(std::lround(std::max(0.0, dn)));
+      }
+    }
+    return image;
+  }
+  /// Edges are a pixel and a half wide.
+  [[nodiscard]] double cover(int u, int v) const { return part(u, v, 0.0, 40.0); }
+  [[nodiscard]] double own_light(int u, int v) const {
+    return 20.0 * part(u, v, 0.0, 30.0) + 900.0 * part(u, v, 30.0, 40.0);
+  }
+  [[nodiscard]] PixelPoint photocentre() const {
+    const double weight = 20.0 * 30.0 + 900.0 * 10.0;
+    return {corner.u + (20.0 * 30.0 * 15.0 + 900.0 * 10.0 * 35.0) / weight, corner.v + 10.0};
+  }
+
+ private:
+  static double edge(double x) { return std::clamp(x / 1.5 + 0.5, 0.0, 1.0); }
+  [[nodiscard]] double part(int u, int v, double from, double to) const {
+    const double along = edge(u - corner.u - from) - edge(u - corner.u - to);
+    return along * (edge(v - corner.v) - edge(v - corner.v - 20.0));
+  }
+};
+
+TEST(Tracker, ATargetDarkerThanTheEarthBehindItIsFoundByItsOwnLight) {
+  // Edges are good to a tenth of a pixel: of 120 px of them, 12 px of sky at 250 DN, a fiftieth of
+  // the target's light, and all at one end, 20 px off: 0.3 px at the very worst.
+  unsigned seed = 1;
+  for (const double sky_dn : {60.0, 250.0, 500.0}) {
+    for (const double slope_dn : {0.0, 0.1, -0.3}) {
+      SCOPED_TRACE(std::to_string(sky_dn) + " " + std::to_string(slope_dn));
+      const BrightScene scene{sky_dn, slope_dn, {40.0 + 0.3 * seed, 50.2}};
+      Tracker tracker(TrackerSpec{}, kSide_px, kSide_px);
+      const Command command = answer(tracker, bytes_of(scene.image(seed++)));
+      EXPECT_EQ(command.kind, CommandKind::kTrim);
+      EXPECT_NEAR(command.detection.centroid_px.u, scene.photocentre().u, 0.3);
+      EXPECT_NEAR(command.detection.centroid_px.v, scene.photocentre().v, 0.3);
+      EXPECT_NEAR(command.detection.box_px[0], scene.corner.u, 2.5);
+      EXPECT_NEAR(command.detection.box_px[2], scene.corner.u + 40.0, 2.5);
+    }
+  }
+}
+
+TEST(Tracker, CountsTheCamerasBlackForNoLight) {
+  // A pedestal under all of it changes nothing.
+  const BrightScene scene;
+  engine::DnImage raised = scene.image(1);
+  for (std::uint16_t& dn : raised.pixels()) dn = static_cast<std::uint16_t>(dn + 100);
+  TrackerSpec spec;
+  Tracker plain(spec, kSide_px, kSide_px);
+  spec.black_dn = 100;
+  Tracker told(spec, kSide_px, kSide_px);
+  const PixelPoint want = answer(plain, bytes_of(scene.image(1))).detection.centroid_px;
+  const PixelPoint got = answer(told, bytes_of(raised)).detection.centroid_px;
+  EXPECT_NEAR(got.u, want.u, 1e-4);  // a packet's single precision
+  EXPECT_NEAR(got.v, want.v, 1e-4);
+}
+
+TEST(Tracker, ASkyThatGrowsBrighterIsNoDetection) {
+  for (const double slope_dn : {0.0, 0.3, -1.0, 1.9}) {
+    for (unsigned seed = 1; seed <= 5; ++seed) {
+      BrightScene scene{.sky_dn = 250, .slope_dn = slope_dn};
+      scene.with_target = false;
+      Tracker tracker(TrackerSpec{}, kSide_px, kSide_px);
+      EXPECT_EQ(answer(tracker, bytes_of(scene.image(seed))).detection.confidence, 0.0F)
+          << slope_dn << " " << seed;
+    }
+  }
+}
+
+TEST(Tracker, ASharpLimbIsNoTargetAndHidesNone) {
+  // The Earth without air: dark to the left of a line, bright to the right.
+  for (const bool with_target : {false, true}) {
+    for (const int limb_u : {85, 100}) {
+      BrightScene scene{.sky_dn = 250, .slope_dn = 0, .corner = {10, 50}};
+      scene.with_target = false;
+      engine::DnImage image = scene.image(3);
+      engine::DnImage dark = with_target ? spot_at({30.3, 60.6}) : dark_sky();
+      for (int v = 0; v < kSide_px; ++v)
+        for (int u = 0; u < limb_u; ++u) image.at(u, v) = dark.at(u, v);
+      Tracker tracker(TrackerSpec{}, kSide_px, kSide_px);
+      const Command command = answer(tracker, bytes_of(image));
+      EXPECT_EQ(command.detection.confidence, with_target ? 1.0F : 0.0F) << limb_u;
+      if (!with_target) continue;
+      EXPECT_NEAR(command.detection.centroid_px.u, 30.3, kCentroid_px);
+      EXPECT_NEAR(command.detection.centroid_px.v, 60.6, kCentroid_px);
+    }
+  }
+}
+
+TEST(Tracker, ALargerSpotFarFromWhereTheTargetIsExpectedIsLeftAlone) {
+  Tracker tracker(TrackerSpec{}, kSide_px, kSide_px);
+  for (unsigned k = 0; k < 5; ++k) {
+    engine::DnImage image = spot_at({20.0 + k, 30.0}, 400, k + 1);
+    if (k > 1) add_spot(image, {110.0, 100.0}, 1500);
+    const Command command = answer(tracker, bytes_of(image, k, engine::from_seconds(0.1 * k)));
+    EXPECT_NEAR(command.detection.centroid_px.u, 20.0 + k, 2.0 * kCentroid_px) << k;
+  }
+  // One that has never seen its target takes the larger one.
+  engine::DnImage image = spot_at({20.0, 30.0}, 400);
+  add_spot(image, {110.0, 100.0}, 1500);
+  Tracker fresh(TrackerSpec{}, kSide_px, kSide_px);
+  EXPECT_NEAR(answer(fresh, bytes_of(image)).detection.centroid_px.u, 110.0, kCentroid_px);
+}
+
 }  // namespace

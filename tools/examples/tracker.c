@@ -1,4 +1,5 @@
-/* A tracker in C: threshold, centroid, and a trim that brings the target to the middle.
+/* A tracker in C: threshold, centroid, and a trim that brings the target to the middle. The target is
+ * what differs from the sky, brighter or, before the Earth, darker.
  *
  *   cc -O2 tracker.c -o tracker $(pkg-config --cflags --libs starloop-client) -lm
  *   ./tracker NAME-OF-THE-LINK [rad-per-pixel]
@@ -23,26 +24,26 @@ static double threshold_of(const starloop_frame *frame, double *background) {
     if (median < 0 && 2 * below >= count) median = dn;
   }
   *background = median;
-  return median + 6.0 * fmax(0.5, dn - median);
+  return 6.0 * fmax(0.5, dn - median);
 }
 
-/* 1: found. The centroid of all light over the threshold. */
+/* 1: found. The centroid of all that is off the background by more than the threshold. */
 static int find_target(const starloop_frame *frame, starloop_detection *target) {
   double background = 0, sum = 0, sum_u = 0, sum_v = 0;
   const double threshold = threshold_of(frame, &background);
-  int bright = 0;
+  int found = 0;
   for (int v = 0; v < frame->height_px; ++v) {
     const uint16_t *row = frame->pixels + (size_t)v * (size_t)frame->width_px;
     for (int u = 0; u < frame->width_px; ++u) {
-      if (row[u] <= threshold) continue;
-      const double light = row[u] - background;
-      sum += light;
-      sum_u += light * u;
-      sum_v += light * v;
-      ++bright;
+      const double off = fabs(row[u] - background);
+      if (off <= threshold) continue;
+      sum += off;
+      sum_u += off * u;
+      sum_v += off * v;
+      ++found;
     }
   }
-  if (bright < 4) return 0; /* noise, or a cosmic ray */
+  if (found < 4) return 0; /* noise, or a cosmic ray */
   target->centroid_px[0] = (float)(sum_u / sum);
   target->centroid_px[1] = (float)(sum_v / sum);
   target->confidence = 1;

@@ -14,15 +14,17 @@ import starloop_client
 
 
 def find_target(pixels):
-    """(u, v) of the centroid of all light over the threshold, or None."""
+    """(u, v) of the centroid of all that is brighter or, before the Earth, darker than the
+    background by more than the threshold, or None."""
     # The background is the median; its noise is what 84 % of a normal distribution stay under.
     below = numpy.cumsum(numpy.bincount(pixels.ravel()))
     median, one_sigma = numpy.searchsorted(below, [0.5 * pixels.size, 0.841 * pixels.size])
-    v, u = numpy.nonzero(pixels > median + 6.0 * max(0.5, one_sigma - median))
+    off = numpy.abs(pixels - numpy.float32(median))
+    v, u = numpy.nonzero(off > 6.0 * max(0.5, one_sigma - median))
     if len(u) < 4:  # noise, or a cosmic ray
         return None
-    light = pixels[v, u] - float(median)
-    return (light @ u) / light.sum(), (light @ v) / light.sum()
+    off = off[v, u].astype(float)
+    return (off @ u) / off.sum(), (off @ v) / off.sum()
 
 
 class Filter:

@@ -1,4 +1,5 @@
-// A tracker in C++ with OpenCV: the largest bright blob, and a trim that brings it to the middle.
+// A tracker in C++ with OpenCV: the largest blob that differs from the sky, brighter or, before the
+// Earth, darker, and a trim that brings it to the middle.
 //
 //   c++ -O2 tracker_opencv.cpp -o tracker $(pkg-config --cflags --libs starloop-client opencv4)
 //   ./tracker NAME-OF-THE-LINK [rad-per-pixel]
@@ -22,17 +23,19 @@ bool find_target(const starloop_frame& frame, starloop_detection& target) {
   cv::Scalar mean;
   cv::Scalar deviation;
   cv::meanStdDev(smooth, mean, deviation);
-  // Once more without what is bright: that is the background.
-  const cv::Mat dark = smooth <= mean[0] + deviation[0];
-  cv::meanStdDev(smooth, mean, deviation, dark);
-  cv::Mat bright = smooth > mean[0] + 8.0 * std::max(0.5, deviation[0]);
+  // Once more without what differs: that is the background.
+  cv::Mat off;
+  cv::absdiff(smooth, cv::Scalar(mean[0]), off);
+  cv::meanStdDev(smooth, mean, deviation, off <= std::max(0.5, deviation[0]));
+  cv::absdiff(smooth, cv::Scalar(mean[0]), off);
+  cv::Mat differs = off > 8.0 * std::max(0.5, deviation[0]);
   // Close the gaps that shadows cut into the target.
-  cv::dilate(bright, bright, cv::getStructuringElement(cv::MORPH_RECT, {9, 9}));
+  cv::dilate(differs, differs, cv::getStructuringElement(cv::MORPH_RECT, {9, 9}));
 
   cv::Mat labels;
   cv::Mat stats;
   cv::Mat centres;
-  const int count = cv::connectedComponentsWithStats(bright, labels, stats, centres);
+  const int count = cv::connectedComponentsWithStats(differs, labels, stats, centres);
   int best = 0;
   for (int i = 1; i < count; ++i)
     if (best == 0 || stats.at<int>(i, cv::CC_STAT_AREA) > stats.at<int>(best, cv::CC_STAT_AREA))
@@ -43,7 +46,8 @@ bool find_target(const starloop_frame& frame, starloop_detection& target) {
                      stats.at<int>(best, cv::CC_STAT_WIDTH),
                      stats.at<int>(best, cv::CC_STAT_HEIGHT));
   cv::Mat light;
-  cv::subtract(image(box), cv::Scalar(mean[0]), light, labels(box) == best, CV_32F);
+  cv::subtract(image(box), cv::Scalar(mean[0]), light, cv::noArray(), CV_32F);
+  light = cv::abs(light);
   light.setTo(0, labels(box) != best);
   const cv::Moments m = cv::moments(light);
   if (!(m.m00 > 0)) return false;

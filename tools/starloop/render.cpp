@@ -59,7 +59,9 @@ std::vector<engine::FitsCard> header_of(const Scenario& s, const RenderOptions& 
 }  // namespace
 
 int render_frame(const CommonOptions& options, const RenderOptions& render) {
-  const Scenario scenario = load_scenario(options);
+  Scenario scenario = load_scenario(options);
+  // What a run gathers over its frames this one has from the beginning.
+  scenario.render.settled = true;
   Rig rig(scenario, options.threads);
   hil::ScriptedPointing pointing = rig.prediction();
   engine::Shot shot;
@@ -93,6 +95,8 @@ int render_frame(const CommonOptions& options, const RenderOptions& render) {
     if (std::isfinite(noise.rms))
       std::printf("rendering noise %.3f of the sensor's over %d lit pixels, at worst %.2f\n",
                   noise.rms, noise.lit_px, noise.worst);
+    if (scenario.run.render_time > engine::Duration{})
+      std::printf("render.deadline_ms is for runs: this picture took the time it needed\n");
     for (const engine::Rung& rung : report.render.rungs)
       if (!rung.ladder.empty())
         std::printf("%s: %s%s\n", std::string(rung.ladder).c_str(), std::string(rung.taken).c_str(),

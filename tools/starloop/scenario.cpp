@@ -66,6 +66,21 @@ RunSpec read_run(const ConfigTable& table) {
   return run;
 }
 
+/// What a clock decides can be told afterwards, not beforehand: only in a run that is paced by one.
+Duration read_deadline(const ConfigTable& table, const RunSpec& run, engine::RenderMethod method) {
+  if (table.is_text("deadline_ms"))
+    return table.choice_or<Duration>("deadline_ms", "none", {{"none", Duration{}}});
+  if (!table.has("deadline_ms")) return {};
+  const double longest_ms = engine::seconds(run.period) * 1e3;
+  const Duration deadline =
+      from_seconds(table.number("deadline_ms", engine::between(0.1, longest_ms)) * 1e-3);
+  if (run.clock != ClockMode::kRealtime)
+    table.fail("deadline_ms", "needs run.clock = \"realtime\": no other run asks a clock");
+  if (method != engine::RenderMethod::kPaths)
+    table.fail("deadline_ms", "needs render.method = \"paths\": no other stops half-way");
+  return deadline;
+}
+
 void read_record(const ConfigTable& table, RunSpec& run) {
   run.record_frames = table.choice_or<RecordFrames>("frames", "png",
                                                     {{"none", RecordFrames::kNone},
@@ -209,6 +224,7 @@ Scenario read_scenario(const ConfigReader& config) {
   s.materials = engine::read_materials(config);
   s.optics = engine::read_optics(config.table("optics"), s.scene.camera);
   s.render = engine::read_render(config.table("render"));
+  s.run.render_time = read_deadline(config.table("render"), s.run, s.render.method);
   s.render.camera = s.scene.camera;
   if (!s.companions.empty() && s.render.method != engine::RenderMethod::kPaths)
     config.table("render").fail("method", "must be \"paths\" where there are companions");
@@ -235,6 +251,7 @@ Scenario read_scenario(const ConfigReader& config) {
   s.jitter = hil::read_jitter(config);
   s.sensors = hil::read_sensors(config.table("sensors"));
   s.tracker = read_tracker(config.table("tracker"), s.scene.camera);
+  s.tracker.black_dn = s.detector.pedestal_dn;
   config.reject_unknown_keys();
   return s;
 }

@@ -40,6 +40,7 @@ struct RunSpec {
   engine::Duration exposure{};
   engine::Duration period{};
   engine::Duration command_lead{};
+  engine::Duration render_time{};  ///< of a frame, at most; zero: as long as it takes
   engine::Duration answer_timeout{};
   ClockMode clock = ClockMode::kRealtime;
   std::string trigger;        ///< "packet", "stdin", or the path of a pipe: a line is a pull

@@ -1,0 +1,361 @@
+#include "engine/render/texel_light.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <utility>
+
+#include "engine/core/constants.h"
+#include "engine/core/random.h"
+
+namespace engine {
+namespace {
+
+using Eigen::Matrix3f;
+using Eigen::Vector3d;
+using Eigen::Vector3f;
+
+constexpr std::size_t kMostKept = std::size_t{1} << 17U;
+constexpr int kKeptAShare = 64;
+// A texel's width in pixels, and by which factor it may come to be off.
+constexpr double kTexelsAPx = 3.0;
+constexpr double kMostOff = 1.5;
+constexpr std::uint32_t kRaysAtOnce = 8;
+// Places that may be where a texel's rays start: first so many, and if none is good up to the last.
+constexpr std::array<std::size_t, 3> kTriedStarts = {0, 8, 72};
+constexpr std::size_t kRefinedAFrame = 2048;
+constexpr float kMostTurned_rad = 8e-3F;
+constexpr std::uint32_t kSumEvery = 4;
+constexpr std::uint32_t kSumEvenEvery = 16;
+constexpr float kWeightSteps = 65535.0F;
+
+/// The bins in an order of which each first 4 and 16 lie in different quarters and sixteenths.
+constexpr std::array<std::uint8_t, HemisphereBins::kBins> kOrder = [] {
+  std::array<std::uint8_t, HemisphereBins::kBins> order{};
+  for (unsigned i = 0; i < order.size(); ++i) {
+    unsigned x = 0;
+    unsigned y = 0;
+    for (unsigned bit = 0; bit < 3; ++bit) {
+      x |= (i >> (2 * bit) & 1U) << (2 - bit);
+      y |= (i >> (2 * bit + 1) & 1U) << (2 - bit);
+    }
+    order[i] = static_cast<std::uint8_t>(y * HemisphereBins::kSide + x);
+  }
+  return order;
+}();
+
+/// Two numbers for each ray of a texel: fractional parts of multiples (Roberts 2018, R2).
+class RayNumbers {
+ public:
+  explicit RayNumbers(std::uint32_t texel) noexcept {
+    Draws draws(4, Stream::kLight, 0, texel);
+    for (double& s : start_) s = static_cast<double>(draws.uniform());
+    turned_ = draws.bits() % HemisphereBins::kBins;
+  }
+  [[nodiscard]] std::size_t bin(std::size_t ray) const noexcept { return kOrder[ray] ^ turned_; }
+  [[nodiscard]] std::array<float, 2> at(std::size_t ray) const noexcept {
+    constexpr std::array<double, 2> kSteps = {0.7548776662466927, 0.5698402909980532};
+    std::array<float, 2> numbers{};
+    for (std::size_t i = 0; i < numbers.size(); ++i) {
+      const double x = start_[i] + kSteps[i] * static_cast<double>(ray);
+      numbers[i] = static_cast<float>(x - std::floor(x));
+    }
+    return numbers;
+  }
+
+ private:
+  std::array<double, 2> start_{};
+  std::size_t turned_ = 0;
+};
+
+Matrix3f axes_of(const Vector3f& normal) noexcept {
+  return basis_round(normal.cast<double>()).cast<float>();
+}
+
+std::uint16_t rounded(float weight) noexcept {
+  return static_cast<std::uint16_t>(std::clamp(weight, 0.0F, 1.0F) * kWeightSteps + 0.5F);
+}
+
+}  // namespace
+
+TexelLight::TexelLight(const TracedTarget& target, const BodyLight& body_light, int bounces)
+    : target_(target),
+      body_light_(body_light),
+      further_(bounces > 1),
+      grid_(target),
+      kept_of_(grid_.most_texels(), kNone),
+      asked_(grid_.most_texels(), 0),
+      sent_(2 * target.mesh.triangles.size(), 0.0F) {
+  kept_.reserve(kMostKept);
+  values_.reserve(kMostKept);
+  if (further_) patches_.reserve(kMostKept);
+  toward_lamp_.fill(Vector3f::Zero());
+}
+
+void TexelLight::start_over(float texel_m) noexcept {
+  texel_m_ = texel_m;
+  grid_.cut(texel_m);
+  kept_.clear();
+  values_.clear();
+  patches_.clear();
+  refine_from_ = 0;
+  std::fill_n(kept_of_.begin(), grid_.texels(), kNone);
+  std::fill_n(asked_.begin(), grid_.texels(), std::uint8_t{0});
+}
+
+void TexelLight::make_asked() noexcept {
+  const std::uint8_t* const begin = asked_.data();
+  const std::uint8_t* const end = begin + grid_.texels();
+  for (const std::uint8_t* next = begin; next != end; ++next) {
+    next = static_cast<const std::uint8_t*>(
+        std::memchr(next, 1, static_cast<std::size_t>(end - next)));
+    if (next == nullptr) return;
+    const auto number = static_cast<std::uint32_t>(next - begin);
+    asked_[number] = 0;
+    if (kept_.size() == kMostKept) return start_over(texel_m_);
+    kept_of_[number] = static_cast<std::uint32_t>(kept_.size());
+    Kept& kept = kept_.emplace_back();
+    kept.texel = grid_.texel(number);
+    kept.number = number;
+    values_.push_back(0.0F);
+    if (further_) patches_.emplace_back();
+  }
+}
+
+void TexelLight::light_sides(const Snapshot& snapshot, std::size_t lamp) noexcept {
+  const Vector3d toward = lamps_of(snapshot)[lamp]->toward.unit;
+  for (std::uint32_t s = 0; s < sent_.size(); ++s) {
+    const SurfacePoint corner = target_.facets.on_side(s / 2, 0, 0, s % 2);
+    const double c = corner.normal.cast<double>().dot(toward);
+    sent_[s] = c > 0.0
+                   ? static_cast<float>(c * target_.facets.brdf(corner.material).albedo(c) / kPi)
+                   : 0.0F;
+  }
+}
+
+void TexelLight::update(const Snapshot& snapshot, const LampInView& lamp, double px_m,
+                        bool all_rays, WorkerPool& pool) noexcept {
+  const auto wished_m = static_cast<float>(px_m / kTexelsAPx);
+  if (!(wished_m < kMostOff * texel_m_ && texel_m_ < kMostOff * wished_m)) start_over(wished_m);
+  make_asked();
+  ++frame_;
+  const Lamp& light = *lamps_of(snapshot)[lamp.index];
+  irradiance_w_m2_ = static_cast<float>(light.irradiance_w_m2);
+  // Another lamp is one that has turned.
+  if (std::exchange(lamp_, lamp.index) != lamp.index) toward_lamp_.fill(Vector3f::Zero());
+  toward_lamp_[frame_ % kTurns] = light.toward.unit.cast<float>();
+  light_sides(snapshot, lamp.index);
+
+  const std::size_t n = kept_.size();
+  refine_from_ = refine_from_ >= n ? 0 : refine_from_;
+  const std::size_t refine_end = std::min(n, refine_from_ + kRefinedAFrame);
+  const auto rays_of = [&](std::size_t k) -> std::uint32_t {
+    if (all_rays) return kRays;
+    return kept_[k].known == 0 || (k >= refine_from_ && k < refine_end) ? kRaysAtOnce : 0;
+  };
+  pool.rows(0, static_cast<int>((n + kKeptAShare - 1) / kKeptAShare), [&](int share) {
+    const std::size_t first = static_cast<std::size_t>(share) * kKeptAShare;
+    const std::size_t end = std::min(n, first + kKeptAShare);
+    find_starts(first, end, snapshot);
+    std::uint64_t changed = 0;
+    RayPacket packet;
+    std::array<std::pair<Kept*, std::size_t>, RayPacket::kLanes> who{};
+    std::size_t lanes = 0;
+    const auto send = [&] {
+      follow(packet, std::span(who).first(lanes));
+      packet = {};
+      lanes = 0;
+    };
+    for (std::size_t k = first; k < end; ++k) {
+      Kept& kept = kept_[k];
+      const auto sent = static_cast<std::uint32_t>(std::popcount(kept.known));
+      const std::uint32_t last = std::min<std::uint32_t>(kRays, sent + rays_of(k));
+      if (sent == last || kept.starts_known == 0) continue;
+      changed |= std::uint64_t{1} << (k - first);
+      const RayNumbers numbers(kept.number);
+      for (std::uint32_t ray = sent; ray < last; ++ray) {
+        const std::size_t bin = numbers.bin(ray);
+        const auto [c, d] = numbers.at(ray);
+        const auto [a, b] = kept.starts[ray % kept.starts_known];
+        const SurfacePoint from = grid_.place(kept.texel, a, b);
+        packet.set(static_cast<int>(lanes), from.start(),
+                   axes_of(from.normal).transpose() * HemisphereBins::direction(bin, c, d));
+        kept.known |= std::uint64_t{1} << bin;
+        kept.fine[bin] = static_cast<std::uint8_t>(HemisphereBins::fine(bin, c, d));
+        who[lanes++] = {&kept, bin};
+        if (lanes == RayPacket::kLanes) send();
+      }
+    }
+    if (lanes > 0) send();
+    Reflection reflection;
+    for (std::size_t k = first; k < end; ++k)
+      renew(k, (changed >> (k - first) & 1U) != 0, snapshot, lamp, reflection);
+  });
+  refine_from_ = refine_end;
+}
+
+/// Places that the camera sees: parts of a mesh may reach into one another, and a facet's hidden
+/// part sees nothing.
+void TexelLight::find_starts(std::size_t first, std::size_t end,
+                             const Snapshot& snapshot) noexcept {
+  RayPacket packet;
+  struct Asker {
+    Kept* kept = nullptr;
+    std::array<float, 2> place{};
+  };
+  std::array<Asker, RayPacket::kLanes> who{};
+  std::size_t lanes = 0;
+  RayCounts counts;
+  const auto send = [&] {
+    std::array<bool, RayPacket::kLanes> blocked{};
+    target_.scene.occluded(packet, blocked, counts);
+    for (std::size_t l = 0; l < lanes; ++l) {
+      Kept& kept = *who[l].kept;
+      if (!blocked[l] && kept.starts_known < kStarts)
+        kept.starts[kept.starts_known++] = who[l].place;
+    }
+    packet = {};
+    lanes = 0;
+  };
+  for (std::size_t round = 0; round + 1 < kTriedStarts.size(); ++round) {
+    for (std::size_t k = first; k < end; ++k) {
+      Kept& kept = kept_[k];
+      if (kept.tried || kept.starts_known != 0) continue;
+      const RayNumbers numbers(~kept.number);
+      for (std::size_t i = kTriedStarts[round]; i < kTriedStarts[round + 1]; ++i) {
+        const auto [a, b] = numbers.at(i);
+        const SurfacePoint from = grid_.place(kept.texel, a, b);
+        packet.set(static_cast<int>(lanes), from.start(),
+                   (snapshot.camera.m.cast<float>() - from.place).normalized());
+        who[lanes++] = {&kept, {a, b}};
+        if (lanes == RayPacket::kLanes) send();
+      }
+    }
+    if (lanes > 0) send();
+  }
+  for (std::size_t k = first; k < end; ++k) kept_[k].tried = true;
+}
+
+/// A packet's rays to where they end.
+void TexelLight::follow(const RayPacket& packet,
+                        std::span<const std::pair<Kept*, std::size_t>> who) noexcept {
+  std::array<MeshHit, RayPacket::kLanes> hits;
+  RayCounts counts;
+  target_.scene.intersect(packet, hits, counts, RayCoherence::kScattered);
+  for (std::size_t l = 0; l < who.size(); ++l) {
+    const auto [kept, bin] = who[l];
+    Link& link = kept->links[bin];
+    link.side = kNone;
+    if (hits[l].triangle == MeshHit::kNone) continue;
+    const Vector3f d(packet.direction_x[l], packet.direction_y[l], packet.direction_z[l]);
+    const SurfacePoint hit = target_.facets.at(hits[l], d);
+    const SurfacePoint front = target_.facets.on_side(hits[l].triangle, 0, 0, 0);
+    link.side = 2 * hits[l].triangle + (hit.normal.dot(front.normal) > 0.0F ? 0U : 1U);
+    link.weights = {rounded(hits[l].second), rounded(hits[l].third)};
+    if (further_)
+      patches_[static_cast<std::size_t>(kept - kept_.data())][bin] = body_light_.patches().at(hit);
+  }
+}
+
+/// Which of the places met are in the light: of the lamp's map, and of rays where it cannot tell.
+void TexelLight::ask_lamp(Kept& kept, const LampInView& lamp) noexcept {
+  kept.lit = 0;
+  RayPacket packet;
+  std::array<std::size_t, RayPacket::kLanes> bin_of{};
+  std::size_t lanes = 0;
+  RayCounts counts;
+  const auto send = [&] {
+    std::array<bool, RayPacket::kLanes> blocked{};
+    target_.scene.occluded(packet, blocked, counts);
+    for (std::size_t l = 0; l < lanes; ++l)
+      if (!blocked[l]) kept.lit |= std::uint64_t{1} << bin_of[l];
+    packet = {};
+    lanes = 0;
+  };
+  for (std::size_t bin = 0; bin < kRays; ++bin) {
+    const Link& link = kept.links[bin];
+    if (link.side == kNone || !(sent_[link.side] > 0.0F)) continue;
+    const std::uint32_t facet = link.side / 2;
+    Lit lit = lamp.view.facet(facet);
+    if (lit == Lit::kNo) continue;
+    const SurfacePoint place =
+        target_.facets.on_side(facet, static_cast<float>(link.weights[0]) / kWeightSteps,
+                               static_cast<float>(link.weights[1]) / kWeightSteps, link.side % 2);
+    if (lit == Lit::kUnknown) {
+      const Eigen::Vector2f on_map = lamp.view.on_map(place.place);
+      lit = lamp.view.places(facet, on_map, on_map);
+    }
+    if (lit == Lit::kYes) kept.lit |= std::uint64_t{1} << bin;
+    if (lit != Lit::kUnknown) continue;
+    packet.set(static_cast<int>(lanes), place.start(), toward_lamp_[frame_ % kTurns]);
+    bin_of[lanes++] = bin;
+    if (lanes == RayPacket::kLanes) send();
+  }
+  if (lanes > 0) send();
+}
+
+void TexelLight::renew(std::size_t k, bool changed, const Snapshot& snapshot,
+                       const LampInView& lamp, Reflection& reflection) noexcept {
+  Kept& kept = kept_[k];
+  const auto phase = static_cast<std::uint32_t>(k) + frame_;
+  const Vector3f turned = toward_lamp_[kept.lit_in % kTurns] - toward_lamp_[frame_ % kTurns];
+  if (changed || phase % kTurns == 0 ||
+      !(turned.squaredNorm() < kMostTurned_rad * kMostTurned_rad)) {
+    kept.lit_in = frame_;
+    ask_lamp(kept, lamp);
+    changed = true;
+  }
+  const std::uint32_t material = target_.facets.on_side(kept.texel.facet, 0, 0, 0).material;
+  const bool even = body_light_.binned(material).even();
+  if (!changed && phase % (even ? kSumEvenEvery : kSumEvery) != 0) return;
+  weigh(kept, snapshot, reflection);
+  values_[k] = summed_up(k, reflection);
+}
+
+/// Over one facet the camera stands in the same direction.
+void TexelLight::weigh(const Kept& kept, const Snapshot& snapshot,
+                       Reflection& reflection) const noexcept {
+  const std::uint32_t side = 2 * kept.texel.facet + kept.texel.side;
+  if (reflection.side == side) return;
+  reflection.side = side;
+  const SurfacePoint place =
+      target_.facets.on_side(kept.texel.facet, 1.0F / 3.0F, 1.0F / 3.0F, kept.texel.side);
+  const Vector3f to_camera =
+      (snapshot.camera.m - place.place.cast<double>()).normalized().cast<float>();
+  const Vector3f out = axes_of(place.normal) * to_camera;
+  reflection.facing = out.z() > 0.0F;
+  const BinnedBrdf& brdf = body_light_.binned(place.material);
+  if (brdf.even()) {
+    reflection.weights.fill(brdf.even_share());
+  } else {
+    brdf.weigh(out, reflection.weights);
+  }
+}
+
+float TexelLight::summed_up(std::size_t k, const Reflection& reflection) const noexcept {
+  const Kept& kept = kept_[k];
+  const int known = std::popcount(kept.known);
+  if (known == 0) return std::numeric_limits<float>::quiet_NaN();
+  if (!reflection.facing) return 0.0F;
+  HemisphereBins::Values arriving{};
+  float sum = 0.0F;
+  for (std::size_t bin = 0; bin < kRays; ++bin) {
+    const std::uint32_t side = kept.links[bin].side;
+    if (side == kNone) continue;
+    arriving[bin] = (kept.lit >> bin & 1U) != 0 ? sent_[side] : 0.0F;
+    if (further_) arriving[bin] += body_light_.further(lamp_, patches_[k][bin]);
+    sum += arriving[bin];
+  }
+  const float mean = sum / static_cast<float>(known);
+  float reflected = 0.0F;
+  for (std::size_t bin = 0; bin < kRays; ++bin) {
+    // What is not known yet is like the mean of what is.
+    const bool is_known = (kept.known >> bin & 1U) != 0;
+    const std::size_t fine = is_known ? kept.fine[bin] : HemisphereBins::fine(bin, 0.0F, 0.0F);
+    reflected += reflection.weights[fine] * (is_known ? arriving[bin] : mean);
+  }
+  return reflected;
+}
+
+}  // namespace engine

@@ -1,0 +1,120 @@
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "engine/core/worker_pool.h"
+#include "engine/render/body_light.h"
+#include "engine/render/lamp_view.h"
+#include "engine/render/texel_grid.h"
+#include "engine/scene/snapshot.h"
+
+namespace engine {
+
+/// Light of one lamp that comes to the target's surface by way of other places of it, kept by
+/// texels as fine as the camera's pixels: where surfaces stand close together BodyLight's patches
+/// are too coarse.
+///
+/// A texel has 64 rays, one to each of HemisphereBins, and keeps what they meet: fixed to the body,
+/// so found once. It is made in the frame after one that asked for it; it begins with eight of its
+/// rays and gets the others as frames go by. Which of the places met are in the light is asked
+/// anew when the lamp has turned by 8 mrad or 64 frames have passed; what goes to the camera is
+/// summed up every fourth frame, or every sixteenth where all directions are alike. So a frame
+/// depends on those before it, and on nothing else: neither on threads nor on a clock.
+/// 131 072 texels are kept; one more, or pixels half as wide again, and all begin anew.
+/// Light leaves a place evenly, as BouncedLight has it.
+/// Thread: update() the loop's, the rest any. Loop-safe but for the constructor. What it is given
+/// outlives it.
+class TexelLight {
+ public:
+  TexelLight(const TracedTarget& target, const BodyLight& body_light, int bounces);
+
+  /// What a frame needs to know of a lamp.
+  struct LampInView {
+    std::size_t index = 0;
+    const LampView& view;
+  };
+  /// Makes what was asked for since the last call, and renews what is due. `all_rays`: at once.
+  void update(const Snapshot& snapshot, const LampInView& lamp, double px_m, bool all_rays,
+              WorkerPool& pool) noexcept;
+  /// Nothing is kept yet: a frame had better ask, update again and then look.
+  [[nodiscard]] bool cold() const noexcept { return kept_.empty(); }
+
+  /// What bounces to the camera, in W/m^2/sr. Not a number where nothing is kept: asked for.
+  [[nodiscard]] float at(std::uint32_t facet, unsigned side, float second, float third) noexcept {
+    const std::uint32_t texel = grid_.at(facet, side, second, third);
+    const std::uint32_t kept = kept_of_[texel];
+    if (kept != kNone) return irradiance_w_m2_ * values_[kept];
+    std::atomic_ref(asked_[texel]).store(1, std::memory_order_relaxed);
+    return std::numeric_limits<float>::quiet_NaN();
+  }
+
+  [[nodiscard]] std::size_t size() const noexcept { return kept_.size(); }
+
+ private:
+  static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
+  static constexpr std::size_t kRays = HemisphereBins::kBins;
+  static constexpr std::uint32_t kTurns = 64;
+
+  static constexpr std::size_t kStarts = 4;
+
+  /// Where a ray ends.
+  struct Link {
+    std::uint32_t side = kNone;  ///< 2 * facet + side
+    std::array<std::uint16_t, 2> weights{};
+  };
+  struct Kept {
+    TexelGrid::Texel texel;
+    std::uint32_t number = 0;
+    std::uint32_t lit_in = 0;                            ///< frame
+    std::uint64_t known = 0;                             ///< bins whose rays were sent
+    std::uint64_t lit = 0;                               ///< of the places met
+    std::array<std::array<float, 2>, kStarts> starts{};  ///< of rays: places in the texel
+    std::uint32_t starts_known = 0;
+    bool tried = false;
+    std::array<Link, kRays> links{};
+    std::array<std::uint8_t, kRays> fine{};  ///< of HemisphereBins, where the ray went
+  };
+
+  /// How the last side that a thread was at reflects to the camera.
+  struct Reflection {
+    std::uint32_t side = kNone;
+    bool facing = false;
+    HemisphereBins::FineValues weights{};
+  };
+
+  void start_over(float texel_m) noexcept;
+  void make_asked() noexcept;
+  void light_sides(const Snapshot& snapshot, std::size_t lamp) noexcept;
+  void find_starts(std::size_t first, std::size_t end, const Snapshot& snapshot) noexcept;
+  void follow(const RayPacket& packet, std::span<const std::pair<Kept*, std::size_t>> who) noexcept;
+  void ask_lamp(Kept& kept, const LampInView& lamp) noexcept;
+  void renew(std::size_t k, bool changed, const Snapshot& snapshot, const LampInView& lamp,
+             Reflection& reflection) noexcept;
+  void weigh(const Kept& kept, const Snapshot& snapshot, Reflection& reflection) const noexcept;
+  [[nodiscard]] float summed_up(std::size_t k, const Reflection& reflection) const noexcept;
+
+  const TracedTarget& target_;
+  const BodyLight& body_light_;
+  bool further_;
+  TexelGrid grid_;
+  float texel_m_ = 0;
+  std::vector<std::uint32_t> kept_of_;  ///< by texel
+  std::vector<std::uint8_t> asked_;     ///< by texel
+  std::vector<Kept> kept_;
+  std::vector<float> values_;                              ///< by kept, for 1 W/m^2
+  std::vector<std::array<std::uint32_t, kRays>> patches_;  ///< met; only for further bounces
+  std::vector<float> sent_;                                ///< by 2 * facet + side, for 1 W/m^2
+  std::array<Eigen::Vector3f, kTurns> toward_lamp_;        ///< of the last frames
+  std::size_t refine_from_ = 0;
+  std::uint32_t frame_ = 0;
+  std::size_t lamp_ = 0;
+  float irradiance_w_m2_ = 0;
+};
+
+}  // namespace engine
