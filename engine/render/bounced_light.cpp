@@ -1,6 +1,8 @@
 #include "engine/render/bounced_light.h"
 
 #include <algorithm>
+#include <array>
+#include <string_view>
 
 #include "engine/core/constants.h"
 
@@ -145,6 +147,12 @@ double BouncedLight::radiance(const LampCones& lamps, const SurfacePoint& from,
       radiance += question.light_w_m2_sr;
   }
   return radiance;
+}
+
+Rung bounces_rung(int bounces, double left_out_e) noexcept {
+  static constexpr std::array<std::string_view, BouncedLight::kMostBounces + 1> kNames = {
+      "0", "1", "2", "3", "4", "5", "6", "7", "8", "9", "10", "11", "12", "13", "14", "15", "16"};
+  return {"bounces", kNames[static_cast<std::size_t>(bounces)], left_out_e};
 }
 
 }  // namespace engine

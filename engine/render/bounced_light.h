@@ -2,6 +2,7 @@
 
 #include "engine/core/random.h"
 #include "engine/render/lamp_cone.h"
+#include "engine/render/renderer.h"
 #include "engine/render/sobol.h"
 #include "engine/render/traced_target.h"
 #include "engine/scene/snapshot.h"
@@ -105,5 +106,8 @@ class BouncedLight {
   const TracedTarget& target_;
   BounceRules rules_;
 };
+
+/// Of the ladder of bounces. Pre: in [0, BouncedLight::kMostBounces].
+[[nodiscard]] Rung bounces_rung(int bounces, double left_out_e) noexcept;
 
 }  // namespace engine

@@ -78,7 +78,16 @@ RenderReport LatticeRenderer::render(const Snapshot& snapshot, Budget budget,
   report.samples_per_pixel = s * s * side * side;
   report.bounces = spec_.bounces;
   report.visible_fraction = view_.footprint().visible_fraction();
+  report.add(
+      bounces_rung(std::min(spec_.bounces, BouncedLight::kMostBounces), spec_.bounces_left_out_e));
   if (region.empty()) return report;
+  constexpr double kNotKnown = std::numeric_limits<double>::quiet_NaN();
+  report.add({"sun disc", spec_.sun_disc == SunDisc::kOff ? "none" : "glints", kNotKnown});
+  // Harmonics and the cap are the path tracer's: here they are the vector that stands for them.
+  const EarthshineModel model = snapshot.earthshine_rung.model;
+  const bool is_lamp = snapshot.earth.dark();
+  report.add({"earthshine", name_of(is_lamp ? model : EarthshineModel::kVector),
+              is_lamp ? snapshot.earthshine_rung.error_e : kNotKnown});
   light_up(snapshot);
   if (spec_.bounces > 0) {
     texel_lamp_ = snapshot.sun.irradiance_w_m2 > 0.0 ? 0 : 1;

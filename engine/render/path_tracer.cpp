@@ -20,9 +20,6 @@ constexpr double kPilotTrust = 0.9;
 // A shadow's edge narrower than this, in pixels, is as good as hard.
 constexpr double kHardEdge_px = 0.2;
 
-constexpr std::array<std::string_view, BouncedLight::kMostBounces + 1> kNumbers = {
-    "0", "1", "2", "3", "4", "5", "6", "7", "8", "9", "10", "11", "12", "13", "14", "15", "16"};
-
 /// By the pixel's place on the detector, so that a moving region does not move the noise. The first
 /// four words are the image's, the next the pilot's.
 Draws draws_of(const Snapshot& snapshot, int u, int v) noexcept {
@@ -86,7 +83,7 @@ RenderReport PathTracer::render(const Snapshot& snapshot, Budget budget, Radianc
   size_images(out);
 
   report.bounces = bounced_[0].bounces();
-  report.add({"bounces", kNumbers[at(report.bounces)], spec_.bounces_left_out_e});
+  report.add(bounces_rung(report.bounces, spec_.bounces_left_out_e));
   if (out.region.empty()) return report;
   light_up(snapshot, report);
   // Samples know the cap; what harmonics leave out they find.

@@ -225,6 +225,26 @@ TEST(LatticeRenderer, FramesAreTheSameOnAnyNumberOfThreads) {
   }
 }
 
+TEST(LatticeRenderer, SaysWhichRungsItTook) {
+  RenderSpec spec = spec_of(64, 2);
+  spec.bounces_left_out_e = 3.5;
+  Rig rig(spec, plate(), {lambert_material("white", 0.3)});
+  Snapshot snapshot = view_from({0, 0, kRange_m}, {0, 0, 1});
+  snapshot.earthshine_rung.model = EarthshineModel::kPaperLamp;
+  snapshot.earthshine_rung.error_e = 1.5;
+  (void)rig.render(snapshot);
+  const auto taken = [&](std::string_view ladder) {
+    for (const Rung& rung : rig.report.rungs)
+      if (rung.ladder == ladder) return rung;
+    return Rung{};
+  };
+  EXPECT_EQ(taken("bounces").taken, "2");
+  EXPECT_EQ(taken("bounces").error_e, 3.5);
+  EXPECT_EQ(taken("sun disc").taken, "glints");
+  EXPECT_EQ(taken("earthshine").taken, name_of(EarthshineModel::kPaperLamp));
+  EXPECT_EQ(taken("earthshine").error_e, 1.5);
+}
+
 TEST(LatticeRenderer, TakesTheFinestLatticeThatABudgetAllows) {
   Rig rig(spec_of(64), plate(), {lambert_material("white", 0.3)});
   const Snapshot snapshot = view_from({0, 0, kRange_m}, {0, 0, 1});
