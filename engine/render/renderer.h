@@ -25,7 +25,8 @@ struct Radiance {
   int oversampling = 3;
   RadianceImage grid;
   CoverImage cover;  ///< of the same cells: what lies behind them shows through the rest
-  std::vector<PointSource> points;  ///< inside the region
+  static constexpr std::size_t kMostPoints = 64;
+  std::vector<PointSource> points;  ///< inside the region, kMostPoints at most
   double uniform_w_m2_sr = 0;
   /// Behind it all, and none of the renderer's business: the imaging chain draws it.
   EarthBackground earth;
