@@ -60,6 +60,7 @@ ImagingChain::ImagingChain(const SnapshotBuilder& scene, std::unique_ptr<Rendere
       stars_(std::move(stars)),
       irradiance_(camera.width_px, camera.height_px),
       electrons_(camera.width_px, camera.height_px),
+      ifov_rad_(camera.ifov_rad()),
       behind_w_m2_(static_cast<std::size_t>(camera.width_px)) {
   const GridWish wish = optics_.wish();
   const PixelRect most = camera.frame().grown_by(wish.beyond_frame_px);
@@ -71,6 +72,7 @@ ImagingChain::ImagingChain(const SnapshotBuilder& scene, std::unique_ptr<Rendere
     radiance_.targets_cover.reserve(most.width() * wish.oversampling,
                                     most.height() * wish.oversampling);
   }
+  radiance_.points.reserve(Radiance::kMostPoints);
   radiance_.earth.reserve(camera, wish.beyond_frame_px);
 }
 
@@ -194,6 +196,15 @@ void ImagingChain::find_own_photocentre(double e_per_irradiance, FrameTruth& tru
       own.sum_u += moment / s + light * (region.left - 0.5);
       own.sum_v += light * (v + (line + 0.5) / s - 0.5);
     }
+  }
+  for (const PointSource& p : radiance_.points) {
+    if (p.place.u < -0.5 || p.place.u >= irradiance_.width() - 0.5 || p.place.v < -0.5 ||
+        p.place.v >= irradiance_.height() - 0.5)
+      continue;
+    const double light = p.irradiance_w_m2 * std::pow(s / ifov_rad_, 2);
+    own.sum += light;
+    own.sum_u += light * p.place.u;
+    own.sum_v += light * p.place.v;
   }
   const double to_e = optics_.throughput_sr() * e_per_irradiance / (s * s);
   if (own.sum * to_e > 1.0) truth.photocentre_px = {own.sum_u / own.sum, own.sum_v / own.sum};

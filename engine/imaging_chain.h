@@ -34,7 +34,8 @@ class ImagingChain final : public SceneGenerator {
   /// signal_to_noise, and the photocentre.
   void measure_light(const PixelRect& window, Duration exposure, FrameTruth& truth,
                      TruthMask& mask) noexcept;
-  /// The centre of the light of the grid that falls into the frame; as it was when there is none.
+  /// The centre of the target's light that falls into the frame, not blurred; as it was when there
+  /// is none.
   void find_own_photocentre(double e_per_irradiance, FrameTruth& truth) const noexcept;
 
   SnapshotBuilder scene_;
@@ -47,6 +48,7 @@ class ImagingChain final : public SceneGenerator {
   Radiance radiance_;
   IrradianceImage irradiance_;
   ElectronImage electrons_;
+  double ifov_rad_;
   std::vector<float> behind_w_m2_;  ///< a row of the background, on the detector
 };
 

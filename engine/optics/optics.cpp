@@ -221,29 +221,42 @@ void Optics::blur_columns(const Radiance& in, const Grid& grid) noexcept {
     const auto copy = std::span(line_in_[s]).first(line.size());
     std::copy(line.begin(), line.end(), copy.begin());
     lines_[s].forward(std::span<const Complex>(copy), line);
-    if (!in.points.empty()) add_points(in, grid, column, line);
+    if (!in.points.empty()) add_points(in, grid, column, copy, line);
     multiply_otf(in, grid, column, line);
   });
 }
 
-void Optics::add_points(const Radiance& in, const Grid& grid, int column,
+/// `sum` is for what the points add.
+void Optics::add_points(const Radiance& in, const Grid& grid, int column, std::span<Complex> sum,
                         std::span<Complex> spectrum) const noexcept {
   const double fx = static_cast<double>(column) / grid.pixels_x;  // cycles per pixel
   const double cell = 1.0 / kOversampling;
   // A cell's solid angle turns the irradiance of a point into the radiance of one cell. A point is
   // no average over a cell: what multiply_otf() takes out for that goes in here.
   const double to_radiance = std::pow(kOversampling / spec_.camera.ifov_rad(), 2) * sinc(fx * cell);
+  const int rows = grid.cells_y();
+  std::ranges::fill(sum, Complex{});
   for (const PointSource& p : in.points) {
     const double x = p.place.u - grid.left;
     const double y = p.place.v - grid.top;
-    for (int k = 0; k < grid.cells_y(); ++k) {
-      const int signed_k = k <= grid.cells_y() / 2 ? k : k - grid.cells_y();
-      const double fy = static_cast<double>(signed_k) / grid.pixels_y;
-      const double amplitude = p.irradiance_w_m2 * to_radiance * sinc(fy * cell);
-      const double phase = -2.0 * kPi * (fx * x + fy * y);
-      spectrum[at(k)] += Complex(static_cast<float>(amplitude * std::cos(phase)),
-                                 static_cast<float>(amplitude * std::sin(phase)));
+    const double amplitude = p.irradiance_w_m2 * to_radiance;
+    // Turned by the same angle from wave to wave: a thousand turns are good to 1e-13.
+    const std::complex<double> turn = std::polar(1.0, -2.0 * kPi * y / grid.pixels_y);
+    std::complex<double> up = std::polar(amplitude, -2.0 * kPi * fx * x);  // at frequency k
+    std::complex<double> down = up;                                        // and -k
+    sum[0] += Complex(up);
+    for (int k = 1; k <= rows / 2; ++k) {
+      up = {up.real() * turn.real() - up.imag() * turn.imag(),
+            up.real() * turn.imag() + up.imag() * turn.real()};
+      down = {down.real() * turn.real() + down.imag() * turn.imag(),
+              down.imag() * turn.real() - down.real() * turn.imag()};
+      sum[at(k)] += Complex(up);
+      if (k < rows - k) sum[at(rows - k)] += Complex(down);
     }
+  }
+  for (int k = 0; k < rows; ++k) {
+    const double fy = static_cast<double>(std::min(k, rows - k)) / grid.pixels_y;
+    spectrum[at(k)] += sum[at(k)] * static_cast<float>(sinc(fy * cell));
   }
 }
 

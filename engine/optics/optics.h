@@ -78,7 +78,7 @@ class Optics {
   [[nodiscard]] Grid grid_for(const Radiance& in, int wing_px) const noexcept;
   void transform_rows(const Radiance& in, const Grid& grid) noexcept;
   void blur_columns(const Radiance& in, const Grid& grid) noexcept;
-  void add_points(const Radiance& in, const Grid& grid, int column,
+  void add_points(const Radiance& in, const Grid& grid, int column, std::span<Complex> sum,
                   std::span<Complex> spectrum) const noexcept;
   void multiply_otf(const Radiance& in, const Grid& grid, int column,
                     std::span<Complex> spectrum) const noexcept;

@@ -5,6 +5,7 @@
 #include "engine/core/contract.h"
 #include "engine/render/bounce_depth.h"
 #include "engine/render/bounced_light.h"
+#include "engine/render/far_target.h"
 #include "engine/render/lattice_renderer.h"
 #include "engine/render/path_tracer.h"
 
@@ -48,6 +49,10 @@ RenderSpec read_render(const ConfigTable& table) {
       table.choice_or<bool>("caustics", "spread", {{"spread", false}, {"exact", true}});
   spec.sun_disc = table.choice_or<SunDisc>(
       "sun_disc", "auto", {{"auto", SunDisc::kAuto}, {"on", SunDisc::kOn}, {"off", SunDisc::kOff}});
+  spec.far_target = table.choice_or<FarTargetForm>("far_target", "auto",
+                                                   {{"auto", FarTargetForm::kAuto},
+                                                    {"resolved", FarTargetForm::kResolved},
+                                                    {"point", FarTargetForm::kPoint}});
   spec.bounce_share = table.number_or("bounce_share", 0.15, between(0.001, 1.0));
   return spec;
 }
@@ -60,10 +65,16 @@ std::unique_ptr<Renderer> make_renderer(
     const RenderSpec its = with_bounces_settled(spec, *companion);
     if (its.bounces > settled.bounces) settled = its;
   }
-  if (settled.method == RenderMethod::kPaths)
-    return std::make_unique<PathTracer>(settled, std::move(target), pool, companions);
-  ENSURE(companions.empty());
-  return std::make_unique<LatticeRenderer>(settled, std::move(target), pool);
+  std::unique_ptr<Renderer> resolved;
+  if (settled.method == RenderMethod::kPaths) {
+    resolved = std::make_unique<PathTracer>(settled, target, pool, companions);
+  } else {
+    ENSURE(companions.empty());
+    resolved = std::make_unique<LatticeRenderer>(settled, target, pool);
+  }
+  // Bodies that may hide and shade each other have no light as a whole.
+  if (settled.far_target == FarTargetForm::kResolved || !companions.empty()) return resolved;
+  return std::make_unique<FarTarget>(settled, std::move(resolved), std::move(target), pool);
 }
 
 }  // namespace engine

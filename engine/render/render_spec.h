@@ -27,6 +27,13 @@ enum class SunDisc : std::uint8_t {
   kOff
 };
 
+/// How a target is drawn that is small on the detector: FarTarget.
+enum class FarTargetForm : std::uint8_t {
+  kAuto,      ///< by its size and the sensor's noise
+  kResolved,  ///< as any other
+  kPoint      ///< a point, whatever its size
+};
+
 /// What errors a frame may have, as shares of the sensor's noise.
 struct RenderProfile {
   double rho_total = 0.3;  ///< of all model errors together
@@ -50,6 +57,7 @@ struct RenderSpec {
   SequenceKind sequence = SequenceKind::kSobol;  ///< paths
   bool exact_caustics = false;                   ///< paths
   SunDisc sun_disc = SunDisc::kAuto;
+  FarTargetForm far_target = FarTargetForm::kAuto;
   CameraGeometry camera;
   GridWish grid;
   SensorNoise noise;

@@ -31,7 +31,8 @@ struct Radiance {
   PixelRect targets_region;
   RadianceImage targets_grid;
   CoverImage targets_cover;
-  std::vector<PointSource> points;  ///< inside the region
+  static constexpr std::size_t kMostPoints = 64;
+  std::vector<PointSource> points;  ///< inside the region, kMostPoints at most
   double uniform_w_m2_sr = 0;
   /// Behind it all, and none of the renderer's business: the imaging chain draws it.
   EarthBackground earth;

@@ -348,6 +348,29 @@ TEST(ImagingChain, ADarkBallBeforeTheEarthIsAHoleOfItsOwnSize) {
   EXPECT_NEAR(truth.photocentre_px.v, alone.photocentre_px.v, 0.01 * std::abs(off.v));
 }
 
+TEST(ImagingChain, AFarTargetBeforeTheEarthHasThePhotocentreThatItHasAlone) {
+  // Ten centimetres at 69 km are one pixel: points of light, and nothing on the grid.
+  const Mesh ball = test_support::sphere(0.05F, 24, 48, "white");
+  const std::vector<Material> white = {test_support::lambert_material("white", 0.9)};
+  Rig space(1, ball, white, false);
+  Rig earth(1, ball, white, true);
+  DnImage out;
+  const Shot shot = earth.shot(kClosestOfPass3_s, 40.0);
+  const FrameReport alone = space.expose(shot, out);
+  const FrameReport before = earth.expose(shot, out);
+  ASSERT_GT(alone.truth.peak_e, 100.0);
+  const auto is_far = [](const Rung& rung) {
+    return rung.ladder == "target" && (rung.taken == "moments" || rung.taken == "point");
+  };
+  EXPECT_TRUE(std::ranges::any_of(alone.render.rungs, is_far));
+  EXPECT_TRUE(std::ranges::any_of(before.render.rungs, is_far));
+  EXPECT_DOUBLE_EQ(before.truth.visible_fraction, alone.truth.visible_fraction);
+  // Alone it is that of the blurred light, a part of which leaves the window.
+  EXPECT_NEAR(before.truth.photocentre_px.u, alone.truth.photocentre_px.u, 0.5);
+  EXPECT_NEAR(before.truth.photocentre_px.v, alone.truth.photocentre_px.v, 0.5);
+  EXPECT_GT(std::abs(before.truth.photocentre_px.u - kSide_px / 2.0), 30.0);
+}
+
 /// The same radiance wherever light can come from, or a square of it in the middle.
 class Patch final : public Renderer {
  public:

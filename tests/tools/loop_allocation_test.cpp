@@ -20,15 +20,18 @@ namespace {
 using engine::Duration;
 
 /// The paper's pass through a camera of 128 x 128 coarse pixels, the whole telescope in view.
+/// "far": a wide field, in which it is five pixels across and drawn from its light as a whole.
 starloop::Scenario small_scenario(const std::string& what) {
   const bool companions = what == "companions";
-  const std::string method = companions ? "paths" : what;
+  const bool far = what == "far";
+  const std::string method = companions || far ? "paths" : what;
   starloop::CommonOptions options;
   options.file = STARLOOP_SOURCE_DIR "/config/flyby.toml";
   options.overrides = {"camera.width_px=128",
                        "camera.height_px=128",
                        "camera.pixel_pitch_um=13",
-                       "optics.aperture_m=0.18",
+                       far ? "optics.aperture_m=0.015" : "optics.aperture_m=0.18",
+                       far ? "camera.focal_length_m=0.3" : "camera.focal_length_m=4.5",
                        "render.samples_per_pixel=4",
                        "render.method=" + method.substr(0, method.find('_')),
                        "optics.largest_wing_px=16",
@@ -194,6 +197,7 @@ TEST_P(LoopAllocation, FiveHundredFramesTakeNoMoreFromTheHeapThanTen) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Methods, LoopAllocation,
-                         testing::Values("paths", "paths_deadline", "lattice", "companions"));
+                         testing::Values("paths", "paths_deadline", "lattice", "companions",
+                                         "far"));
 
 }  // namespace

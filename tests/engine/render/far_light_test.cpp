@@ -1,0 +1,185 @@
+#include "engine/render/far_light.h"
+
+#include <cmath>
+#include <utility>
+
+#include <gtest/gtest.h>
+
+#include "engine/core/constants.h"
+#include "engine/render/traced_target.h"
+#include "engine/scene/telescope.h"
+#include "tests/support/scenes.h"
+
+namespace engine {
+namespace {
+
+using Eigen::Vector3d;
+using test_support::add_plate;
+using test_support::lambert_material;
+using test_support::look_at_origin;
+
+constexpr double kSun_w_m2 = 624.0;
+const Vector3d kUp(0, 1, 0);
+
+Snapshot seen(const Vector3d& from_m, const Vector3d& to_sun) {
+  Snapshot snapshot = look_at_origin(from_m, kUp);
+  snapshot.sun = {direction_of<BodyFrame>(to_sun), kSun_w_m2};
+  return snapshot;
+}
+
+Mesh plate() {
+  Mesh mesh;
+  add_plate(mesh, "white", {-3, -2, 0}, {6, 0, 0}, {0, 4, 0});
+  return mesh;
+}
+
+struct Rig {
+  Rig(const Mesh& mesh, const std::vector<Material>& materials, int samples = 50, int threads = 1)
+      : Rig(std::make_shared<TracedTarget>(mesh, materials), samples, threads) {}
+  explicit Rig(std::shared_ptr<TracedTarget> target, int samples = 50, int threads = 1)
+      : pool(threads), light(spec(samples), std::move(target), pool) {}
+  static RenderSpec spec(int samples) {
+    RenderSpec spec;
+    spec.samples_per_pixel = samples;
+    spec.bounces = 0;
+    return spec;
+  }
+  WorkerPool pool;
+  FarLight light;
+};
+
+TEST(FarLight, APlateHasItsLambertIntensityAndItsArea) {
+  Rig rig(plate(), {lambert_material("white", 0.3)}, 400);
+  for (const double deg : {0.0, 40.0, 75.0}) {
+    const double a = deg * kDegree;
+    rig.light.update(seen(2e6 * Vector3d(std::sin(a), 0, std::cos(a)), {-0.5, 0.1, 0.7}), 0.0);
+    const double cos_in = 0.7 / std::sqrt(0.25 + 0.01 + 0.49);
+    const double area = 24.0 * std::cos(a);
+    // Edges of 20 m in cells of .12 m, each good to .05 of its samples' share: under 1e-3.
+    EXPECT_NEAR(rig.light.area_m2() / area, 1.0, 1e-3) << deg;
+    EXPECT_NEAR(rig.light.intensity_w_sr() / (0.3 * kSun_w_m2 / kPi * cos_in * area), 1.0, 1e-3)
+        << deg;
+    // An even rectangle.
+    EXPECT_NEAR(rig.light.parts().variance(), (36.0 * std::cos(a) * std::cos(a) + 16.0) / 12.0,
+                0.02)
+        << deg;
+  }
+}
+
+TEST(FarLight, ASphereHasTheLambertPhaseFunction) {
+  Rig rig(test_support::sphere(2.0F, 48, 96, "white"), {lambert_material("white", 0.5)}, 200);
+  for (const double deg : {0.0, 30.0, 90.0, 130.0}) {
+    const double a = deg * kDegree;
+    rig.light.update(seen({0, 0, 2e6}, {std::sin(a), 0, std::cos(a)}), 0.0);
+    const double want =
+        2.0 / 3.0 * 0.5 / kPi * kSun_w_m2 * 4.0 * (std::sin(a) + (kPi - a) * std::cos(a));
+    // The polyhedron's own area is short of the sphere's by 2e-3.
+    EXPECT_NEAR(rig.light.intensity_w_sr() / want, 1.0, 6e-3) << deg;
+  }
+}
+
+TEST(FarLight, AnOffsetBodyHasItsLightOffCentre) {
+  Mesh mesh;
+  add_plate(mesh, "white", {4, 1, 0}, {1, 0, 0}, {0, 1, 0});
+  Rig rig(mesh, {lambert_material("white", 0.3)}, 400);
+  const Snapshot snapshot = seen({0, 0, 2e6}, {0, 0, 1});
+  rig.light.update(snapshot, 0.0);
+  const Vector3d place = rig.light.parts().centre_x() * rig.light.x_axis() +
+                         rig.light.parts().centre_y() * rig.light.y_axis();
+  EXPECT_NEAR(place.x(), 4.5, 0.01);
+  EXPECT_NEAR(place.y(), 1.5, 0.01);
+  // The picture's axes are the camera's.
+  EXPECT_NEAR(rig.light.x_axis().dot(snapshot.body_from_camera.matrix.col(0)), 1.0, 1e-12);
+  EXPECT_NEAR(rig.light.y_axis().dot(snapshot.body_from_camera.matrix.col(1)), 1.0, 1e-12);
+}
+
+/// Whether the picture was made anew.
+bool renewed(FarLight& light, const Snapshot& snapshot, double change) {
+  light.update(snapshot, change);
+  return light.report().rays > 0;
+}
+
+TEST(FarLight, APictureIsKeptUntilSomethingMoves) {
+  Rig rig(plate(), {lambert_material("white", 0.3)});
+  Snapshot snapshot = seen({0, 0, 2e6}, {0.3, 0, 1});
+  EXPECT_TRUE(renewed(rig.light, snapshot, 1e-3));
+  EXPECT_FALSE(renewed(rig.light, snapshot, 1e-3));
+  snapshot.camera.m *= 0.5;  // only the range
+  EXPECT_FALSE(renewed(rig.light, snapshot, 1e-3));
+
+  Snapshot turned = seen({2e4, 0, 2e6}, {0.3, 0, 1});  // 10 mrad
+  EXPECT_TRUE(renewed(rig.light, turned, 1e-3));
+  Snapshot other_sun = turned;
+  other_sun.sun.toward = direction_of<BodyFrame>({0.32, 0, 1});
+  EXPECT_TRUE(renewed(rig.light, other_sun, 1e-3));
+  Snapshot rolled = other_sun;  // 10 mrad about the line of sight
+  rolled.body_from_camera.matrix =
+      Eigen::AngleAxisd(0.01, rolled.camera.m.normalized()) * rolled.body_from_camera.matrix;
+  EXPECT_TRUE(renewed(rig.light, rolled, 1e-3));
+  Snapshot with_earth = rolled;
+  with_earth.earthshine = {direction_of<BodyFrame>({0, 1, 1}), 5.0};
+  EXPECT_TRUE(renewed(rig.light, with_earth, 1e-3));
+  EXPECT_FALSE(renewed(rig.light, with_earth, 1e-3));
+}
+
+TEST(FarLight, AFadingSunIsFollowedIntoTheDark) {
+  Rig rig(plate(), {lambert_material("white", 0.3)});
+  Snapshot snapshot = seen({0, 0, 2e6}, {0.3, 0, 1});
+  rig.light.update(snapshot, 1e-3);
+  const double full = rig.light.intensity_w_sr();
+  for (const double share : {0.999, 0.7, 0.3, 1e-3, 0.0}) {
+    snapshot.sun.irradiance_w_m2 = share * kSun_w_m2;
+    rig.light.update(snapshot, 1e-3);
+    EXPECT_NEAR(rig.light.intensity_w_sr(), share * full, 1.1e-3 * full) << share;
+    EXPECT_NEAR(rig.light.area_m2(), 24.0, 0.1);
+  }
+}
+
+TEST(FarLight, WhatIsKeptOfAGlintIsWithinTheChangeAllowed) {
+  // A cell array, the camera swinging through the Sun's mirror image.
+  Mesh mesh;
+  add_plate(mesh, "silicon", {-3, -2, 0}, {6, 0, 0}, {0, 4, 0});
+  const std::vector<Material> materials = {{"silicon", test_support::silicon()}};
+  Rig kept(mesh, materials);
+  TracedTarget panel(mesh, materials);
+  constexpr double kChange = 5e-3;
+  constexpr int kSteps = 1000;
+  int renewals = 0;
+  double brightest = 0;
+  double faintest = 1e300;
+  double worst = 0;
+  for (int i = 0; i <= kSteps; ++i) {
+    const double a = (29.0 + 2.0 * i / kSteps) * kDegree;
+    const Snapshot snapshot = seen(2e6 * Vector3d(std::sin(a), 0, std::cos(a)),
+                                   {-std::sin(30.0 * kDegree), 0, std::cos(30.0 * kDegree)});
+    renewals += renewed(kept.light, snapshot, kChange) ? 1 : 0;
+    panel.facets.light_up(snapshot, kept.pool);
+    const double want = static_cast<double>(panel.facets.radiance(0)[0]) * 24.0 * std::cos(a);
+    worst = std::max(worst, std::abs(kept.light.intensity_w_sr() / want - 1.0));
+    brightest = std::max(brightest, want);
+    faintest = std::min(faintest, want);
+  }
+  EXPECT_GT(brightest, 2.0 * faintest);  // it is a glint
+  // The last change foretells the next as well as a flank is straight: twice is allowed.
+  EXPECT_LT(worst, 2.0 * kChange);
+  EXPECT_LT(renewals, kSteps * 2 / 3);
+}
+
+TEST(FarLight, SameBitsOnAnyNumberOfThreads) {
+  std::vector<Material> materials = test_support::telescope_materials();
+  const auto run = [&](int threads) {
+    Rig rig(telescope_mesh(), materials, 50, threads);
+    std::vector<float> light;
+    for (int i = 0; i < 4; ++i) {
+      rig.light.update(seen({2e6, 1e6 + 3e3 * i, 1e6}, {0.3, 0.5, 0.8}), 1e-3);
+      for (const FarLight::Cell& cell : rig.light.cells()) light.push_back(cell.light_w_sr);
+    }
+    return light;
+  };
+  const std::vector<float> one = run(1);
+  EXPECT_EQ(one, run(3));
+  EXPECT_GT(one.size(), 4000U);
+}
+
+}  // namespace
+}  // namespace engine
