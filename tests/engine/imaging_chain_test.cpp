@@ -175,17 +175,18 @@ TEST(ImagingChain, PhotocentreOfABallUnderTheSunFollowsItsPlace) {
 }
 
 TEST(ImagingChain, ACompanionBesideTheTargetDoesNotChangeItsTruth) {
-  const Mesh ball = test_support::sphere(1.0F, 24, 48, "white");
+  // 30 pixels across: less is drawn from its light as a whole when it is alone.
+  const Mesh ball = test_support::sphere(1.5F, 24, 48, "white");
   const std::vector<Material> dark{test_support::lambert_material("white", 0.03)};
   for (const bool earth : {false, true}) {
     Rig alone(1, ball, dark, earth);
-    // 6 m to a side and 5 m up: some 60 pixels away, out of each other's light.
-    Rig both(1, ball, dark, earth, {{5.0, 0.0, 6.0}});
+    // 7 m to a side and 5.5 m up: some 70 pixels away, out of each other's light.
+    Rig both(1, ball, dark, earth, {{5.5, 0.0, 7.0}});
     DnImage image;
     DnImage with;
     const FrameTruth want = alone.expose(alone.shot(kClosestOfPass3_s), image).truth;
     const FrameTruth truth = both.expose(both.shot(kClosestOfPass3_s), with).truth;
-    // But for the light that the balls send each other: 1/61 of the sky, times .03.
+    // But for the light that the balls send each other: 1/35 of the sky, times .03.
     EXPECT_NEAR(truth.photocentre_px.u, want.photocentre_px.u, 5e-3);
     EXPECT_NEAR(truth.photocentre_px.v, want.photocentre_px.v, 5e-3);
     EXPECT_NEAR(truth.peak_e / want.peak_e, 1.0, 5e-4);
@@ -203,8 +204,8 @@ TEST(ImagingChain, ACompanionBesideTheTargetDoesNotChangeItsTruth) {
     EXPECT_EQ(other.visible_fraction, 1.0);
     const auto dn = [](const DnImage& i, const PixelPoint& p) {
       int brightest = 0;
-      for (int v = -4; v <= 4; ++v)
-        for (int u = -4; u <= 4; ++u)
+      for (int v = -14; v <= 14; ++v)
+        for (int u = -14; u <= 14; ++u)
           brightest = std::max(brightest, static_cast<int>(i.at(static_cast<int>(p.u) + u,
                                                                 static_cast<int>(p.v) + v)));
       return brightest;

@@ -1,5 +1,5 @@
-/* A tracker in C: threshold, centroid, and a trim that brings the target to the middle. The target is
- * what differs from the sky, brighter or, before the Earth, darker.
+/* A tracker in C: threshold, centroid, and a trim that brings the target to the middle. The target
+ * is what differs from the sky, brighter or, before the Earth, darker.
  *
  *   cc -O2 tracker.c -o tracker $(pkg-config --cflags --libs starloop-client) -lm
  *   ./tracker NAME-OF-THE-LINK [rad-per-pixel]
