@@ -19,7 +19,7 @@ constexpr double kDirectionsARadian = 1000.0;
 // on the map, so a plane is off by that on its slope, and rounding adds some.
 constexpr float kAbove_steps = 0.05F;
 constexpr float kAcross_steps = 0.25F;
-constexpr int kMostSteps = 12;
+constexpr int kMostSteps = 24;
 
 }  // namespace
 
@@ -130,6 +130,7 @@ Lit LampView::places(std::uint32_t facet, const Eigen::Vector2f& low,
       any_above = any_above || above;
       all_above = all_above && nearness[i] > height;
     }
+    if (any_above && !all_above) return Lit::kUnknown;
   }
   if (!any_above) return Lit::kYes;
   return all_above ? Lit::kNo : Lit::kUnknown;

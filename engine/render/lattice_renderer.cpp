@@ -255,9 +255,10 @@ void LatticeRenderer::shade(const Row& row, int column, const Tone& tone) noexce
   const SurfacePoint middle = view_.place_on(
       tone.facet, static_cast<float>(column * n) + static_cast<float>(sum_x) / half_steps,
       static_cast<float>(row.index * n) + static_cast<float>(sum_y) / half_steps, direction);
-  if (spec_.bounces > 0) add_bounced(row, column, tone, middle);
+  const PixelOnFacet pixel = pixel_on(tone.facet, column, row.index);
+  if (spec_.bounces > 0) add_bounced(row, column, tone, middle, pixel);
   for (std::size_t k = 0; k < kLamps; ++k)
-    if (target_->facets.radiance(tone.facet)[k] > 0.0F) add_lamp(row, column, tone, k);
+    if (target_->facets.radiance(tone.facet)[k] > 0.0F) add_lamp(row, column, tone, k, pixel);
 
   const float share =
       body_light_.mirror_share(middle.material, -middle.normal.dot(direction) / direction.norm());
@@ -270,25 +271,36 @@ void LatticeRenderer::shade(const Row& row, int column, const Tone& tone) noexce
   if (++queue.used == RayPacket::kLanes) send_mirror_rays(row);
 }
 
-/// By texels, and by patches where there is none yet.
-void LatticeRenderer::add_bounced(const Row& row, int column, const Tone& tone,
-                                  const SurfacePoint& middle) noexcept {
-  const int s = spec_.grid.oversampling;
+LatticeRenderer::PixelOnFacet LatticeRenderer::pixel_on(std::uint32_t facet, int column,
+                                                        int row) const noexcept {
   const int n = view_.points_a_pixel();
   Vector3f direction;
-  const auto weights = [&](int x, int y) {
-    const SurfacePoint place = view_.place_on(tone.facet, static_cast<float>(column * n + x),
-                                              static_cast<float>(row.index * n + y), direction);
-    const auto [second, third] = target_->facets.weights_at(tone.facet, place.place);
+  const auto place = [&](int x, int y) {
+    return view_
+        .place_on(facet, static_cast<float>(column * n + x), static_cast<float>(row * n + y),
+                  direction)
+        .place;
+  };
+  const Vector3f corner = place(0, 0);
+  return {corner, place(n, 0) - corner, place(0, n) - corner};
+}
+
+/// By texels, and by patches where there is none yet.
+void LatticeRenderer::add_bounced(const Row& row, int column, const Tone& tone,
+                                  const SurfacePoint& middle, const PixelOnFacet& pixel) noexcept {
+  const int s = spec_.grid.oversampling;
+  const float per_half_step = 0.5F / static_cast<float>(view_.points_a_pixel());
+  const auto weights = [&](const Vector3f& place) {
+    const auto [second, third] = target_->facets.weights_at(tone.facet, place);
     return Vector2f(second, third);
   };
-  // The pixel on the facet: near enough a parallelogram.
-  const Vector2f corner = weights(0, 0);
-  const Vector2f per_half_x = (weights(n, 0) - corner) / static_cast<float>(2 * n);
-  const Vector2f per_half_y = (weights(0, n) - corner) / static_cast<float>(2 * n);
+  const Vector2f corner = weights(pixel.corner);
+  const Vector2f per_half_x = per_half_step * (weights(pixel.corner + pixel.across) - corner);
+  const Vector2f per_half_y = per_half_step * (weights(pixel.corner + pixel.down) - corner);
   const SurfacePoint front = target_->facets.on_side(tone.facet, 0, 0, 0);
   const unsigned side = middle.normal.dot(front.normal) > 0.0F ? 0 : 1;
-  const float other = kept_by_patch(1 - texel_lamp_, middle);
+  const bool both = row.snapshot.earthshine.irradiance_w_m2 > 0.0 && texel_lamp_ == 0;
+  const float other = both ? kept_by_patch(1, middle) : 0.0F;
   for (std::size_t cell = 0; cell < at(s * s); ++cell) {
     if (tone.in_cell[cell] == 0) continue;
     const auto points = static_cast<float>(tone.in_cell[cell]);
@@ -305,40 +317,33 @@ float LatticeRenderer::kept_by_patch(std::size_t lamp, const SurfacePoint& place
   return patch == SurfacePatches::kNone ? 0.0F : body_light_.to_camera(lamp)[patch];
 }
 
-void LatticeRenderer::add_lamp(const Row& row, int column, const Tone& tone,
-                               std::size_t lamp) const noexcept {
+void LatticeRenderer::add_lamp(const Row& row, int column, const Tone& tone, std::size_t lamp,
+                               const PixelOnFacet& pixel) const noexcept {
   const LampView& view = lamp_views_[lamp];
-  const Lit whole = view.facet(tone.facet);
-  if (whole == Lit::kNo) return;
   const int s = spec_.grid.oversampling;
-  const int n = view_.points_a_pixel();
-  const auto x = static_cast<float>(column * n);
-  const auto y = static_cast<float>(row.index * n);
-  const auto span = static_cast<float>(n);
-  Vector2f corner;
-  Vector2f per_cell_x;
-  Vector2f per_cell_y;
-  if (whole == Lit::kUnknown) {
-    // The pixel on the lamp's map: near enough a parallelogram.
-    Vector3f direction;
-    corner = view.on_map(view_.place_on(tone.facet, x, y, direction).place);
-    per_cell_x = (view.on_map(view_.place_on(tone.facet, x + span, y, direction).place) - corner) /
-                 static_cast<float>(s);
-    per_cell_y = (view.on_map(view_.place_on(tone.facet, x, y + span, direction).place) - corner) /
-                 static_cast<float>(s);
-  }
+  const Vector2f corner = view.on_map(pixel.corner);
+  const Vector2f across = view.on_map(pixel.corner + pixel.across) - corner;
+  const Vector2f down = view.on_map(pixel.corner + pixel.down) - corner;
+  // A parallelogram from `from`, `size` pixels wide.
+  const auto ask_map = [&](const Vector2f& from, float size) {
+    const Vector2f b = from + size * across;
+    const Vector2f c = from + size * down;
+    const Vector2f d = b + size * down;
+    return view.places(tone.facet, from.cwiseMin(b).cwiseMin(c).cwiseMin(d),
+                       from.cwiseMax(b).cwiseMax(c).cwiseMax(d));
+  };
+  Lit whole = view.facet(tone.facet);
+  if (whole == Lit::kUnknown) whole = ask_map(corner, 1.0F);
+  if (whole == Lit::kNo) return;
+  const float cell_px = 1.0F / static_cast<float>(s);
   const float light = target_->facets.radiance(tone.facet)[lamp];
   for (std::size_t cell = 0; cell < at(s * s); ++cell) {
     if (tone.in_cell[cell] == 0) continue;
     Lit lit = whole;
     if (lit == Lit::kUnknown) {
-      const Vector2f a = corner + static_cast<float>(static_cast<int>(cell) % s) * per_cell_x +
-                         static_cast<float>(static_cast<int>(cell) / s) * per_cell_y;
-      const Vector2f b = a + per_cell_x;
-      const Vector2f c = a + per_cell_y;
-      const Vector2f d = b + per_cell_y;
-      lit = view.places(tone.facet, a.cwiseMin(b).cwiseMin(c).cwiseMin(d),
-                        a.cwiseMax(b).cwiseMax(c).cwiseMax(d));
+      const auto x = static_cast<float>(static_cast<int>(cell) % s);
+      const auto y = static_cast<float>(static_cast<int>(cell) / s);
+      lit = ask_map(corner + x * cell_px * across + y * cell_px * down, cell_px);
     }
     if (lit == Lit::kYes) add(row, column, cell, static_cast<float>(tone.in_cell[cell]), light);
     if (lit == Lit::kUnknown) doubt(row, column, tone, cell, lamp);

@@ -48,6 +48,12 @@ class LatticeRenderer final : public Renderer {
     std::array<std::uint16_t, kMostCells> sum_x{};
     std::array<std::uint16_t, kMostCells> sum_y{};
   };
+  /// A pixel on a facet's plane: near enough a parallelogram.
+  struct PixelOnFacet {
+    Eigen::Vector3f corner;
+    Eigen::Vector3f across;  ///< to the pixel's right
+    Eigen::Vector3f down;
+  };
   /// Points of one facet in one cell, of which some are asked whether a lamp reaches them.
   struct Doubt {
     std::size_t lamp = 0;
@@ -104,10 +110,12 @@ class LatticeRenderer final : public Renderer {
                int length) const noexcept;
   void shade_pixel(const Row& row, int column) noexcept;
   void shade(const Row& row, int column, const Tone& tone) noexcept;
-  void add_bounced(const Row& row, int column, const Tone& tone,
-                   const SurfacePoint& middle) noexcept;
+  void add_bounced(const Row& row, int column, const Tone& tone, const SurfacePoint& middle,
+                   const PixelOnFacet& pixel) noexcept;
+  [[nodiscard]] PixelOnFacet pixel_on(std::uint32_t facet, int column, int row) const noexcept;
   [[nodiscard]] float kept_by_patch(std::size_t lamp, const SurfacePoint& place) const noexcept;
-  void add_lamp(const Row& row, int column, const Tone& tone, std::size_t lamp) const noexcept;
+  void add_lamp(const Row& row, int column, const Tone& tone, std::size_t lamp,
+                const PixelOnFacet& pixel) const noexcept;
   void doubt(const Row& row, int column, const Tone& tone, std::size_t cell,
              std::size_t lamp) const noexcept;
   void ask(const Row& row, std::size_t doubt, bool rest) const noexcept;

@@ -88,6 +88,7 @@ TexelLight::TexelLight(const TracedTarget& target, const BodyLight& body_light, 
       asked_(grid_.most_texels(), 0),
       sent_(2 * target.mesh.triangles.size(), 0.0F) {
   kept_.reserve(kMostKept);
+  states_.reserve(kMostKept);
   values_.reserve(kMostKept);
   if (further_) patches_.reserve(kMostKept);
   toward_lamp_.fill(Vector3f::Zero());
@@ -97,6 +98,7 @@ void TexelLight::start_over(float texel_m) noexcept {
   texel_m_ = texel_m;
   grid_.cut(texel_m);
   kept_.clear();
+  states_.clear();
   values_.clear();
   patches_.clear();
   refine_from_ = 0;
@@ -118,6 +120,9 @@ void TexelLight::make_asked() noexcept {
     Kept& kept = kept_.emplace_back();
     kept.texel = grid_.texel(number);
     kept.number = number;
+    kept.sides.fill(kNone);
+    const std::uint32_t material = target_.facets.on_side(kept.texel.facet, 0, 0, 0).material;
+    states_.push_back({frame_, 0, false, body_light_.binned(material).even()});
     values_.push_back(0.0F);
     if (further_) patches_.emplace_back();
   }
@@ -147,52 +152,70 @@ void TexelLight::update(const Snapshot& snapshot, const LampInView& lamp, double
   toward_lamp_[frame_ % kTurns] = light.toward.unit.cast<float>();
   light_sides(snapshot, lamp.index);
 
+  note_turned();
+
   const std::size_t n = kept_.size();
-  refine_from_ = refine_from_ >= n ? 0 : refine_from_;
-  const std::size_t refine_end = std::min(n, refine_from_ + kRefinedAFrame);
-  const auto rays_of = [&](std::size_t k) -> std::uint32_t {
-    if (all_rays) return kRays;
-    return kept_[k].known == 0 || (k >= refine_from_ && k < refine_end) ? kRaysAtOnce : 0;
-  };
+  if (refine_from_ >= n) refine_from_ = 0;
   pool.rows(0, static_cast<int>((n + kKeptAShare - 1) / kKeptAShare), [&](int share) {
     const std::size_t first = static_cast<std::size_t>(share) * kKeptAShare;
-    const std::size_t end = std::min(n, first + kKeptAShare);
-    find_starts(first, end, snapshot);
-    std::uint64_t changed = 0;
-    RayPacket packet;
-    std::array<std::pair<Kept*, std::size_t>, RayPacket::kLanes> who{};
-    std::size_t lanes = 0;
-    const auto send = [&] {
-      follow(packet, std::span(who).first(lanes));
-      packet = {};
-      lanes = 0;
-    };
-    for (std::size_t k = first; k < end; ++k) {
-      Kept& kept = kept_[k];
-      const auto sent = static_cast<std::uint32_t>(std::popcount(kept.known));
-      const std::uint32_t last = std::min<std::uint32_t>(kRays, sent + rays_of(k));
-      if (sent == last || kept.starts_known == 0) continue;
-      changed |= std::uint64_t{1} << (k - first);
-      const RayNumbers numbers(kept.number);
-      for (std::uint32_t ray = sent; ray < last; ++ray) {
-        const std::size_t bin = numbers.bin(ray);
-        const auto [c, d] = numbers.at(ray);
-        const auto [a, b] = kept.starts[ray % kept.starts_known];
-        const SurfacePoint from = grid_.place(kept.texel, a, b);
-        packet.set(static_cast<int>(lanes), from.start(),
-                   axes_of(from.normal).transpose() * HemisphereBins::direction(bin, c, d));
-        kept.known |= std::uint64_t{1} << bin;
-        kept.fine[bin] = static_cast<std::uint8_t>(HemisphereBins::fine(bin, c, d));
-        who[lanes++] = {&kept, bin};
-        if (lanes == RayPacket::kLanes) send();
-      }
-    }
-    if (lanes > 0) send();
-    Reflection reflection;
-    for (std::size_t k = first; k < end; ++k)
-      renew(k, (changed >> (k - first) & 1U) != 0, snapshot, lamp, reflection);
+    tend(first, std::min(n, first + kKeptAShare), snapshot, lamp, all_rays);
   });
-  refine_from_ = refine_end;
+  refine_from_ += kRefinedAFrame;
+}
+
+void TexelLight::note_turned() noexcept {
+  for (std::size_t f = 0; f < kTurns; ++f) {
+    const float turned = (toward_lamp_[f] - toward_lamp_[frame_ % kTurns]).squaredNorm();
+    // A direction that is no number has turned.
+    turned_[f] = !(turned < kMostTurned_rad * kMostTurned_rad);
+  }
+}
+
+void TexelLight::tend(std::size_t first, std::size_t end, const Snapshot& snapshot,
+                      const LampInView& lamp, bool all_rays) noexcept {
+  find_starts(first, end, snapshot);
+  const std::uint64_t changed = send_rays(first, end, all_rays);
+  Reflection reflection;
+  for (std::size_t k = first; k < end; ++k)
+    renew(k, (changed >> (k - first) & 1U) != 0, snapshot, lamp, reflection);
+}
+
+/// Bit i of the result: the texel `first` + i has further ones.
+std::uint64_t TexelLight::send_rays(std::size_t first, std::size_t end, bool all_rays) noexcept {
+  std::uint64_t changed = 0;
+  RayPacket packet;
+  std::array<std::pair<Kept*, std::size_t>, RayPacket::kLanes> who{};
+  std::size_t lanes = 0;
+  const auto send = [&] {
+    follow(packet, std::span(who).first(lanes));
+    packet = {};
+    lanes = 0;
+  };
+  for (std::size_t k = first; k < end; ++k) {
+    State& state = states_[k];
+    const bool due = state.rays == 0 || (k >= refine_from_ && k < refine_from_ + kRefinedAFrame);
+    if (state.rays == kRays || !(due || all_rays)) continue;
+    Kept& kept = kept_[k];
+    if (kept.starts_known == 0) continue;
+    changed |= std::uint64_t{1} << (k - first);
+    const RayNumbers numbers(kept.number);
+    const std::size_t last = all_rays ? kRays : state.rays + kRaysAtOnce;
+    for (std::size_t ray = state.rays; ray < last; ++ray) {
+      const std::size_t bin = numbers.bin(ray);
+      const auto [c, d] = numbers.at(ray);
+      const auto [a, b] = kept.starts[ray % kept.starts_known];
+      const SurfacePoint from = grid_.place(kept.texel, a, b);
+      packet.set(static_cast<int>(lanes), from.start(),
+                 axes_of(from.normal).transpose() * HemisphereBins::direction(bin, c, d));
+      kept.known |= std::uint64_t{1} << bin;
+      kept.fine[bin] = static_cast<std::uint8_t>(HemisphereBins::fine(bin, c, d));
+      who[lanes++] = {&kept, bin};
+      if (lanes == RayPacket::kLanes) send();
+    }
+    state.rays = static_cast<std::uint8_t>(last);
+  }
+  if (lanes > 0) send();
+  return changed;
 }
 
 /// Places that the camera sees: parts of a mesh may reach into one another, and a facet's hidden
@@ -220,8 +243,9 @@ void TexelLight::find_starts(std::size_t first, std::size_t end,
   };
   for (std::size_t round = 0; round + 1 < kTriedStarts.size(); ++round) {
     for (std::size_t k = first; k < end; ++k) {
+      if (states_[k].tried) continue;
       Kept& kept = kept_[k];
-      if (kept.tried || kept.starts_known != 0) continue;
+      if (kept.starts_known != 0) continue;
       const RayNumbers numbers(~kept.number);
       for (std::size_t i = kTriedStarts[round]; i < kTriedStarts[round + 1]; ++i) {
         const auto [a, b] = numbers.at(i);
@@ -234,7 +258,7 @@ void TexelLight::find_starts(std::size_t first, std::size_t end,
     }
     if (lanes > 0) send();
   }
-  for (std::size_t k = first; k < end; ++k) kept_[k].tried = true;
+  for (std::size_t k = first; k < end; ++k) states_[k].tried = true;
 }
 
 /// A packet's rays to where they end.
@@ -245,14 +269,13 @@ void TexelLight::follow(const RayPacket& packet,
   target_.scene.intersect(packet, hits, counts, RayCoherence::kScattered);
   for (std::size_t l = 0; l < who.size(); ++l) {
     const auto [kept, bin] = who[l];
-    Link& link = kept->links[bin];
-    link.side = kNone;
+    kept->sides[bin] = kNone;
     if (hits[l].triangle == MeshHit::kNone) continue;
     const Vector3f d(packet.direction_x[l], packet.direction_y[l], packet.direction_z[l]);
     const SurfacePoint hit = target_.facets.at(hits[l], d);
     const SurfacePoint front = target_.facets.on_side(hits[l].triangle, 0, 0, 0);
-    link.side = 2 * hits[l].triangle + (hit.normal.dot(front.normal) > 0.0F ? 0U : 1U);
-    link.weights = {rounded(hits[l].second), rounded(hits[l].third)};
+    kept->sides[bin] = 2 * hits[l].triangle + (hit.normal.dot(front.normal) > 0.0F ? 0U : 1U);
+    kept->weights[bin] = {rounded(hits[l].second), rounded(hits[l].third)};
     if (further_)
       patches_[static_cast<std::size_t>(kept - kept_.data())][bin] = body_light_.patches().at(hit);
   }
@@ -274,14 +297,14 @@ void TexelLight::ask_lamp(Kept& kept, const LampInView& lamp) noexcept {
     lanes = 0;
   };
   for (std::size_t bin = 0; bin < kRays; ++bin) {
-    const Link& link = kept.links[bin];
-    if (link.side == kNone || !(sent_[link.side] > 0.0F)) continue;
-    const std::uint32_t facet = link.side / 2;
+    const std::uint32_t side = kept.sides[bin];
+    if (side == kNone || !(sent_[side] > 0.0F)) continue;
+    const std::uint32_t facet = side / 2;
     Lit lit = lamp.view.facet(facet);
     if (lit == Lit::kNo) continue;
     const SurfacePoint place =
-        target_.facets.on_side(facet, static_cast<float>(link.weights[0]) / kWeightSteps,
-                               static_cast<float>(link.weights[1]) / kWeightSteps, link.side % 2);
+        target_.facets.on_side(facet, static_cast<float>(kept.weights[bin][0]) / kWeightSteps,
+                               static_cast<float>(kept.weights[bin][1]) / kWeightSteps, side % 2);
     if (lit == Lit::kUnknown) {
       const Eigen::Vector2f on_map = lamp.view.on_map(place.place);
       lit = lamp.view.places(facet, on_map, on_map);
@@ -297,19 +320,16 @@ void TexelLight::ask_lamp(Kept& kept, const LampInView& lamp) noexcept {
 
 void TexelLight::renew(std::size_t k, bool changed, const Snapshot& snapshot,
                        const LampInView& lamp, Reflection& reflection) noexcept {
-  Kept& kept = kept_[k];
-  const auto phase = static_cast<std::uint32_t>(k) + frame_;
-  const Vector3f turned = toward_lamp_[kept.lit_in % kTurns] - toward_lamp_[frame_ % kTurns];
-  if (changed || phase % kTurns == 0 ||
-      !(turned.squaredNorm() < kMostTurned_rad * kMostTurned_rad)) {
-    kept.lit_in = frame_;
-    ask_lamp(kept, lamp);
+  State& state = states_[k];
+  // Neighbours at once: they lie side by side in memory.
+  const auto phase = static_cast<std::uint32_t>(k / kKeptAShare) + frame_;
+  if (changed || phase % kTurns == 0 || turned_[state.lit_in % kTurns]) {
+    state.lit_in = frame_;
+    ask_lamp(kept_[k], lamp);
     changed = true;
   }
-  const std::uint32_t material = target_.facets.on_side(kept.texel.facet, 0, 0, 0).material;
-  const bool even = body_light_.binned(material).even();
-  if (!changed && phase % (even ? kSumEvenEvery : kSumEvery) != 0) return;
-  weigh(kept, snapshot, reflection);
+  if (!changed && phase % (state.even ? kSumEvenEvery : kSumEvery) != 0) return;
+  weigh(kept_[k], snapshot, reflection);
   values_[k] = summed_up(k, reflection);
 }
 
@@ -341,12 +361,13 @@ float TexelLight::summed_up(std::size_t k, const Reflection& reflection) const n
   HemisphereBins::Values arriving{};
   float sum = 0.0F;
   for (std::size_t bin = 0; bin < kRays; ++bin) {
-    const std::uint32_t side = kept.links[bin].side;
+    const std::uint32_t side = kept.sides[bin];
     if (side == kNone) continue;
-    arriving[bin] = (kept.lit >> bin & 1U) != 0 ? sent_[side] : 0.0F;
+    arriving[bin] = static_cast<float>(kept.lit >> bin & 1U) * sent_[side];
     if (further_) arriving[bin] += body_light_.further(lamp_, patches_[k][bin]);
     sum += arriving[bin];
   }
+  if (sum == 0.0F) return 0.0F;
   const float mean = sum / static_cast<float>(known);
   float reflected = 0.0F;
   for (std::size_t bin = 0; bin < kRays; ++bin) {

@@ -63,24 +63,26 @@ class TexelLight {
 
   static constexpr std::size_t kStarts = 4;
 
-  /// Where a ray ends.
-  struct Link {
-    std::uint32_t side = kNone;  ///< 2 * facet + side
-    std::array<std::uint16_t, 2> weights{};
-  };
   struct Kept {
     TexelGrid::Texel texel;
     std::uint32_t number = 0;
-    std::uint32_t lit_in = 0;                            ///< frame
     std::uint64_t known = 0;                             ///< bins whose rays were sent
     std::uint64_t lit = 0;                               ///< of the places met
     std::array<std::array<float, 2>, kStarts> starts{};  ///< of rays: places in the texel
     std::uint32_t starts_known = 0;
-    bool tried = false;
-    std::array<Link, kRays> links{};
-    std::array<std::uint8_t, kRays> fine{};  ///< of HemisphereBins, where the ray went
+    // By bin: where its ray went, and what it met.
+    std::array<std::uint8_t, kRays> fine{};    ///< of HemisphereBins
+    std::array<std::uint32_t, kRays> sides{};  ///< 2 * facet + side, or kNone
+    std::array<std::array<std::uint16_t, 2>, kRays> weights{};
   };
 
+  /// What says whether there is anything to do: apart, for it is looked at in each frame.
+  struct State {
+    std::uint32_t lit_in = 0;  ///< frame
+    std::uint8_t rays = 0;     ///< sent
+    bool tried = false;        ///< starts have been looked for
+    bool even = false;         ///< BinnedBrdf::even()
+  };
   /// How the last side that a thread was at reflects to the camera.
   struct Reflection {
     std::uint32_t side = kNone;
@@ -91,6 +93,10 @@ class TexelLight {
   void start_over(float texel_m) noexcept;
   void make_asked() noexcept;
   void light_sides(const Snapshot& snapshot, std::size_t lamp) noexcept;
+  void note_turned() noexcept;
+  void tend(std::size_t first, std::size_t end, const Snapshot& snapshot, const LampInView& lamp,
+            bool all_rays) noexcept;
+  [[nodiscard]] std::uint64_t send_rays(std::size_t first, std::size_t end, bool all_rays) noexcept;
   void find_starts(std::size_t first, std::size_t end, const Snapshot& snapshot) noexcept;
   void follow(const RayPacket& packet, std::span<const std::pair<Kept*, std::size_t>> who) noexcept;
   void ask_lamp(Kept& kept, const LampInView& lamp) noexcept;
@@ -107,10 +113,12 @@ class TexelLight {
   std::vector<std::uint32_t> kept_of_;  ///< by texel
   std::vector<std::uint8_t> asked_;     ///< by texel
   std::vector<Kept> kept_;
+  std::vector<State> states_;                              ///< by kept
   std::vector<float> values_;                              ///< by kept, for 1 W/m^2
   std::vector<std::array<std::uint32_t, kRays>> patches_;  ///< met; only for further bounces
   std::vector<float> sent_;                                ///< by 2 * facet + side, for 1 W/m^2
   std::array<Eigen::Vector3f, kTurns> toward_lamp_;        ///< of the last frames
+  std::array<bool, kTurns> turned_{};                      ///< of these: too far since
   std::size_t refine_from_ = 0;
   std::uint32_t frame_ = 0;
   std::size_t lamp_ = 0;
