@@ -131,6 +131,14 @@ TEST(StarloopReplay, LockstepComesBackAndItsPicturesToo) {
   EXPECT_TRUE(hil::recorded_pixels(out / "frames.slog", 5));
 }
 
+TEST(StarloopReplay, WhatIsKeptOnTheBodyFromFrameToFrameComesBackToo) {
+  const Recorded run({"render.method=lattice", "render.lattice=2x2", "run.duration_s=1.5",
+                      "camera.width_px=96", "camera.height_px=96"});
+  ASSERT_EQ(run.run.exit_code, kGood) << run.run.err;
+  EXPECT_EQ(replay(run.log(), {"--threads", "1"}).exit_code, kGood);
+  EXPECT_EQ(replay(run.log(), {"--threads", "3"}).exit_code, kGood);
+}
+
 TEST(StarloopReplay, AnAlteredFrameIsNamedWithWhatDiffers) {
   const Recorded run(
       {"run.clock=lockstep", "run.duration_s=0.5", "run.record_every=1", "record.frames=raw"});
