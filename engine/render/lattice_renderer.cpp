@@ -18,6 +18,8 @@ constexpr std::array<int, kAskEvery> kAsks = {0, 2, 1, 3};
 constexpr bool asks_first(int x, int y) noexcept {
   return x % kAskEvery == kAsks[static_cast<std::size_t>(y % kAskEvery)];
 }
+// A frame is made again for texels that it asked for: once, and where they had to be made coarser.
+constexpr int kMostRounds = 4;
 // Of a cell's points of one facet: so few are asked at once.
 constexpr int kFewPoints = 6;
 
@@ -94,7 +96,8 @@ RenderReport LatticeRenderer::render(const Snapshot& snapshot, Budget budget,
     const TexelLight::LampInView lamp{texel_lamp_, lamp_views_[texel_lamp_]};
     const double px_m = snapshot.camera.m.norm() * spec_.camera.ifov_rad();
     texels_.update(snapshot, lamp, px_m, spec_.settled, pool_);
-    if (texels_.cold() || spec_.settled) {
+    for (int round = 0; round < kMostRounds && (texels_.cold() || (spec_.settled && round == 0));
+         ++round) {
       pool_.rows(0, region.height(), [&](int row) { shade_row(snapshot, out, row); });
       texels_.update(snapshot, lamp, px_m, spec_.settled, pool_);
     }

@@ -40,13 +40,14 @@ TexelGrid::TexelGrid(const TracedTarget& target)
   }
 }
 
-void TexelGrid::cut(float texel_m) noexcept {
+float TexelGrid::cut(float texel_m) noexcept {
   constexpr float kCoarser = 1.4142F;
   constexpr int kMostTries = 64;
   std::uint64_t number = number_through(texel_m);
   for (int t = 0; number > most_texels_ && t < kMostTries; ++t)
     number = number_through(texel_m *= kCoarser);
   texels_ = static_cast<std::uint32_t>(number);
+  return texel_m;
 }
 
 std::uint64_t TexelGrid::number_through(float texel_m) noexcept {

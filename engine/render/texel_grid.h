@@ -17,8 +17,8 @@ class TexelGrid {
  public:
   explicit TexelGrid(const TracedTarget& target);
 
-  /// Texels no wider than this, unless there would be too many.
-  void cut(float texel_m) noexcept;
+  /// Texels no wider than this, unless there would be too many: how wide they are at most.
+  float cut(float texel_m) noexcept;
 
   [[nodiscard]] std::size_t most_texels() const noexcept { return most_texels_; }
   [[nodiscard]] std::uint32_t texels() const noexcept { return texels_; }

@@ -95,8 +95,8 @@ TexelLight::TexelLight(const TracedTarget& target, const BodyLight& body_light, 
 }
 
 void TexelLight::start_over(float texel_m) noexcept {
-  texel_m_ = texel_m;
-  grid_.cut(texel_m);
+  texel_m_ = grid_.cut(texel_m);
+  if (texel_m_ > texel_m) least_m_ = texel_m_;
   kept_.clear();
   states_.clear();
   values_.clear();
@@ -115,7 +115,10 @@ void TexelLight::make_asked() noexcept {
     if (next == nullptr) return;
     const auto number = static_cast<std::uint32_t>(next - begin);
     asked_[number] = 0;
-    if (kept_.size() == kMostKept) return start_over(texel_m_);
+    if (kept_.size() == kMostKept) {
+      least_m_ = static_cast<float>(kMostOff) * texel_m_;
+      return start_over(least_m_);
+    }
     kept_of_[number] = static_cast<std::uint32_t>(kept_.size());
     Kept& kept = kept_.emplace_back();
     kept.texel = grid_.texel(number);
@@ -141,8 +144,8 @@ void TexelLight::light_sides(const Snapshot& snapshot, std::size_t lamp) noexcep
 
 void TexelLight::update(const Snapshot& snapshot, const LampInView& lamp, double px_m,
                         bool all_rays, WorkerPool& pool) noexcept {
-  const auto wished_m = static_cast<float>(px_m / kTexelsAPx);
-  if (!(wished_m < kMostOff * texel_m_ && texel_m_ < kMostOff * wished_m)) start_over(wished_m);
+  const float wished_m = std::max(static_cast<float>(px_m / kTexelsAPx), least_m_);
+  if (!(wished_m <= kMostOff * texel_m_ && texel_m_ <= kMostOff * wished_m)) start_over(wished_m);
   make_asked();
   ++frame_;
   const Lamp& light = *lamps_of(snapshot)[lamp.index];

@@ -26,7 +26,8 @@ namespace engine {
 /// anew when the lamp has turned by 8 mrad or 64 frames have passed; what goes to the camera is
 /// summed up every fourth frame, or every sixteenth where all directions are alike. So a frame
 /// depends on those before it, and on nothing else: neither on threads nor on a clock.
-/// 131 072 texels are kept; one more, or pixels half as wide again, and all begin anew.
+/// 131 072 texels are kept: for one more all begin anew, half as wide again, and when pixels have
+/// become that much wider or narrower.
 /// Light leaves a place evenly, as BouncedLight has it.
 /// Thread: update() the loop's, the rest any. Loop-safe but for the constructor. What it is given
 /// outlives it.
@@ -110,6 +111,7 @@ class TexelLight {
   bool further_;
   TexelGrid grid_;
   float texel_m_ = 0;
+  float least_m_ = 0;                   ///< there is no room for finer texels
   std::vector<std::uint32_t> kept_of_;  ///< by texel
   std::vector<std::uint8_t> asked_;     ///< by texel
   std::vector<Kept> kept_;

@@ -195,10 +195,10 @@ TEST(TexelGrid, EveryPlaceOfAFacetHasATexelRoundIt) {
 TEST(TexelGrid, CutsNoFinerThanThereIsRoomFor) {
   const TracedTarget target(corner(), {lambert_material("grey", 0.5)});
   TexelGrid grid(target);
-  grid.cut(1e-4F);
+  EXPECT_GT(grid.cut(1e-4F), 1e-4F);
   EXPECT_LE(grid.texels(), grid.most_texels());
   EXPECT_GT(grid.texels(), grid.most_texels() / 4);
-  grid.cut(1e6F);
+  EXPECT_EQ(grid.cut(1e6F), 1e6F);
   EXPECT_EQ(grid.texels(), 8U);  // two sides of four facets
 }
 
@@ -250,6 +250,25 @@ TEST(TexelLight, WallIsLitByTheFloorAsItsFormFactorSaysToTheCorner) {
     // chance has it, and leaves .7 % of what a floor all round would send.
     EXPECT_NEAR((sum - want) / (0.5 * leaving), 0.0, 0.02) << h;
   }
+}
+
+TEST(TexelLight, MoreTexelsThanThereIsRoomForAreMadeCoarser) {
+  Texels texels(corner(), before_the_wall());
+  // Pixels of a centimetre: 144 m^2 of texels of a third of that are 13 million.
+  const auto look = [&] {
+    for (int i = 0; i < 700; ++i)
+      for (int k = 0; k < 700; ++k)
+        for (std::uint32_t f = 0; f < 4; ++f)
+          (void)texels.light.at(f, 0, static_cast<float>(i) / 700.0F,
+                                static_cast<float>(k) / 700.0F);
+    texels.light.update(texels.seen, {0, texels.view}, 0.01, false, texels.pool);
+  };
+  for (int frame = 0; frame < 12; ++frame) look();
+  // It has come to rest: all that is looked at is there.
+  const std::size_t kept = texels.light.size();
+  EXPECT_GT(kept, 10'000U);
+  look();
+  EXPECT_EQ(texels.light.size(), kept);
 }
 
 TEST(TexelLight, PartsThatReachIntoOneAnotherDoNotDarkenTheSeam) {
