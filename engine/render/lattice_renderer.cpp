@@ -95,11 +95,17 @@ RenderReport LatticeRenderer::render(const Snapshot& snapshot, Budget budget,
     texel_lamp_ = snapshot.sun.irradiance_w_m2 > 0.0 ? 0 : 1;
     const TexelLight::LampInView lamp{texel_lamp_, lamp_views_[texel_lamp_]};
     const double px_m = snapshot.camera.m.norm() * spec_.camera.ifov_rad();
-    texels_.update(snapshot, lamp, px_m, spec_.settled, pool_);
-    for (int round = 0; round < kMostRounds && (texels_.cold() || (spec_.settled && round == 0));
-         ++round) {
+    const auto update = [&] {
+      const bool again = texels_.update(snapshot, lamp, px_m, spec_.settled, pool_);
+      const RayCounts counts = texels_.rays();
+      report.rays += counts.rays;
+      report.rejected_rays += counts.rejected;
+      return again;
+    };
+    bool again = update() || texels_.cold() || spec_.settled;
+    for (int round = 0; round < kMostRounds && again; ++round) {
       pool_.rows(0, region.height(), [&](int row) { shade_row(snapshot, out, row); });
-      texels_.update(snapshot, lamp, px_m, spec_.settled, pool_);
+      again = update();
     }
   }
   pool_.rows(0, region.height(), [&](int row) { shade_row(snapshot, out, row); });

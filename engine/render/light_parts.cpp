@@ -8,8 +8,8 @@ namespace {
 
 /// Third and fourth moments, or differences of such.
 struct HighMoments {
-  std::array<double, 4> third{};   // xxx, xxy, xyy, yyy
-  std::array<double, 5> fourth{};  // xxxx, xxxy, ...
+  std::array<double, 4> third{};   // of x^3, x^2 y, x y^2, y^3
+  std::array<double, 5> fourth{};  // of x^4, x^3 y, ...
   void add(double weight, double x, double y) noexcept {
     third[0] += weight * x * x * x;
     third[1] += weight * x * x * y;

@@ -11,8 +11,9 @@ constexpr std::size_t kManyTexels = std::size_t{1} << 21U;
 constexpr float kMostSteps = 4096.0F;
 
 std::uint16_t steps_along(float edge_m, float texel_m) noexcept {
+  const float steps = std::ceil(edge_m / texel_m);
   // An edge that is no number has one step.
-  return static_cast<std::uint16_t>(std::clamp(std::ceil(edge_m / texel_m), 1.0F, kMostSteps));
+  return steps > 1.0F ? static_cast<std::uint16_t>(std::min(steps, kMostSteps)) : std::uint16_t{1};
 }
 
 }  // namespace

@@ -1,7 +1,6 @@
 #include "engine/render/texel_light.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <cstring>
 #include <utility>
@@ -18,6 +17,7 @@ using Eigen::Vector3f;
 
 constexpr std::size_t kMostKept = std::size_t{1} << 17U;
 constexpr int kKeptAShare = 64;
+constexpr std::uint32_t kSidesAShare = 1024;
 // A texel's width in pixels, and by which factor it may come to be off.
 constexpr double kTexelsAPx = 3.0;
 constexpr double kMostOff = 1.5;
@@ -69,6 +69,12 @@ class RayNumbers {
   std::size_t turned_ = 0;
 };
 
+constexpr std::size_t kQuarters = 4;
+constexpr std::size_t quarter_of(std::size_t bin) noexcept {
+  constexpr std::size_t kHalf = HemisphereBins::kSide / 2;
+  return bin / HemisphereBins::kSide / kHalf * 2 + bin % HemisphereBins::kSide / kHalf;
+}
+
 Matrix3f axes_of(const Vector3f& normal) noexcept {
   return basis_round(normal.cast<double>()).cast<float>();
 }
@@ -106,18 +112,20 @@ void TexelLight::start_over(float texel_m) noexcept {
   std::fill_n(asked_.begin(), grid_.texels(), std::uint8_t{0});
 }
 
-void TexelLight::make_asked() noexcept {
+/// False: there was no room.
+bool TexelLight::make_asked() noexcept {
   const std::uint8_t* const begin = asked_.data();
   const std::uint8_t* const end = begin + grid_.texels();
   for (const std::uint8_t* next = begin; next != end; ++next) {
     next = static_cast<const std::uint8_t*>(
         std::memchr(next, 1, static_cast<std::size_t>(end - next)));
-    if (next == nullptr) return;
+    if (next == nullptr) break;
     const auto number = static_cast<std::uint32_t>(next - begin);
     asked_[number] = 0;
     if (kept_.size() == kMostKept) {
       least_m_ = static_cast<float>(kMostOff) * texel_m_;
-      return start_over(least_m_);
+      start_over(least_m_);
+      return false;
     }
     kept_of_[number] = static_cast<std::uint32_t>(kept_.size());
     Kept& kept = kept_.emplace_back();
@@ -129,32 +137,43 @@ void TexelLight::make_asked() noexcept {
     values_.push_back(0.0F);
     if (further_) patches_.emplace_back();
   }
+  return true;
 }
 
-void TexelLight::light_sides(const Snapshot& snapshot, std::size_t lamp) noexcept {
+void TexelLight::light_sides(const Snapshot& snapshot, std::size_t lamp,
+                             WorkerPool& pool) noexcept {
   const Vector3d toward = lamps_of(snapshot)[lamp]->toward.unit;
-  for (std::uint32_t s = 0; s < sent_.size(); ++s) {
-    const SurfacePoint corner = target_.facets.on_side(s / 2, 0, 0, s % 2);
-    const double c = corner.normal.cast<double>().dot(toward);
-    sent_[s] = c > 0.0
-                   ? static_cast<float>(c * target_.facets.brdf(corner.material).albedo(c) / kPi)
-                   : 0.0F;
-  }
+  const auto sides = static_cast<std::uint32_t>(sent_.size());
+  pool.rows(0, static_cast<int>((sides + kSidesAShare - 1) / kSidesAShare), [&](int share) {
+    const std::uint32_t first = static_cast<std::uint32_t>(share) * kSidesAShare;
+    for (std::uint32_t s = first; s < std::min(sides, first + kSidesAShare); ++s) {
+      const SurfacePoint corner = target_.facets.on_side(s / 2, 0, 0, s % 2);
+      const double c = corner.normal.cast<double>().dot(toward);
+      sent_[s] = c > 0.0
+                     ? static_cast<float>(c * target_.facets.brdf(corner.material).albedo(c) / kPi)
+                     : 0.0F;
+    }
+  });
 }
 
-void TexelLight::update(const Snapshot& snapshot, const LampInView& lamp, double px_m,
+void TexelLight::count(const RayCounts& counts) noexcept {
+  rays_.fetch_add(counts.rays, std::memory_order_relaxed);
+  rejected_.fetch_add(counts.rejected, std::memory_order_relaxed);
+}
+
+bool TexelLight::update(const Snapshot& snapshot, const LampInView& lamp, double px_m,
                         bool all_rays, WorkerPool& pool) noexcept {
   const float wished_m = std::max(static_cast<float>(px_m / kTexelsAPx), least_m_);
   if (!(wished_m <= kMostOff * texel_m_ && texel_m_ <= kMostOff * wished_m)) start_over(wished_m);
-  make_asked();
+  const bool had_room = make_asked();
+  rays_ = rejected_ = 0;
   ++frame_;
   const Lamp& light = *lamps_of(snapshot)[lamp.index];
   irradiance_w_m2_ = static_cast<float>(light.irradiance_w_m2);
   // Another lamp is one that has turned.
   if (std::exchange(lamp_, lamp.index) != lamp.index) toward_lamp_.fill(Vector3f::Zero());
   toward_lamp_[frame_ % kTurns] = light.toward.unit.cast<float>();
-  light_sides(snapshot, lamp.index);
-
+  light_sides(snapshot, lamp.index, pool);
   note_turned();
 
   const std::size_t n = kept_.size();
@@ -164,6 +183,7 @@ void TexelLight::update(const Snapshot& snapshot, const LampInView& lamp, double
     tend(first, std::min(n, first + kKeptAShare), snapshot, lamp, all_rays);
   });
   refine_from_ += kRefinedAFrame;
+  return !had_room;
 }
 
 void TexelLight::note_turned() noexcept {
@@ -262,6 +282,7 @@ void TexelLight::find_starts(std::size_t first, std::size_t end,
     if (lanes > 0) send();
   }
   for (std::size_t k = first; k < end; ++k) states_[k].tried = true;
+  if (counts.rays + counts.rejected > 0) count(counts);
 }
 
 /// A packet's rays to where they end.
@@ -270,6 +291,7 @@ void TexelLight::follow(const RayPacket& packet,
   std::array<MeshHit, RayPacket::kLanes> hits;
   RayCounts counts;
   target_.scene.intersect(packet, hits, counts, RayCoherence::kScattered);
+  count(counts);
   for (std::size_t l = 0; l < who.size(); ++l) {
     const auto [kept, bin] = who[l];
     kept->sides[bin] = kNone;
@@ -319,6 +341,7 @@ void TexelLight::ask_lamp(Kept& kept, const LampInView& lamp) noexcept {
     if (lanes == RayPacket::kLanes) send();
   }
   if (lanes > 0) send();
+  if (counts.rays + counts.rejected > 0) count(counts);
 }
 
 void TexelLight::renew(std::size_t k, bool changed, const Snapshot& snapshot,
@@ -358,26 +381,33 @@ void TexelLight::weigh(const Kept& kept, const Snapshot& snapshot,
 
 float TexelLight::summed_up(std::size_t k, const Reflection& reflection) const noexcept {
   const Kept& kept = kept_[k];
-  const int known = std::popcount(kept.known);
-  if (known == 0) return std::numeric_limits<float>::quiet_NaN();
+  if (kept.known == 0) return std::numeric_limits<float>::quiet_NaN();
   if (!reflection.facing) return 0.0F;
   HemisphereBins::Values arriving{};
-  float sum = 0.0F;
+  std::array<float, kQuarters> sum{};
+  std::array<float, kQuarters> sent{};
   for (std::size_t bin = 0; bin < kRays; ++bin) {
+    if ((kept.known >> bin & 1U) == 0) continue;
+    sent[quarter_of(bin)] += 1.0F;
     const std::uint32_t side = kept.sides[bin];
     if (side == kNone) continue;
     arriving[bin] = static_cast<float>(kept.lit >> bin & 1U) * sent_[side];
     if (further_) arriving[bin] += body_light_.further(lamp_, patches_[k][bin]);
-    sum += arriving[bin];
+    sum[quarter_of(bin)] += arriving[bin];
   }
-  if (sum == 0.0F) return 0.0F;
-  const float mean = sum / static_cast<float>(known);
   float reflected = 0.0F;
   for (std::size_t bin = 0; bin < kRays; ++bin) {
-    // What is not known yet is like the mean of what is.
-    const bool is_known = (kept.known >> bin & 1U) != 0;
-    const std::size_t fine = is_known ? kept.fine[bin] : HemisphereBins::fine(bin, 0.0F, 0.0F);
-    reflected += reflection.weights[fine] * (is_known ? arriving[bin] : mean);
+    if ((kept.known >> bin & 1U) != 0) {
+      reflected += reflection.weights[kept.fine[bin]] * arriving[bin];
+      continue;
+    }
+    // What is not known yet is like what is of the same quarter of the hemisphere: no quarter is
+    // without, the first rays have it so.
+    float weight = 0.0F;
+    for (const float a : {0.0F, 0.5F})
+      for (const float b : {0.0F, 0.5F})
+        weight += 0.25F * reflection.weights[HemisphereBins::fine(bin, a, b)];
+    reflected += weight * sum[quarter_of(bin)] / sent[quarter_of(bin)];
   }
   return reflected;
 }

@@ -41,7 +41,8 @@ class TexelLight {
     const LampView& view;
   };
   /// Makes what was asked for since the last call, and renews what is due. `all_rays`: at once.
-  void update(const Snapshot& snapshot, const LampInView& lamp, double px_m, bool all_rays,
+  /// True: there was no room, and all begins anew with coarser texels that have to be asked for.
+  bool update(const Snapshot& snapshot, const LampInView& lamp, double px_m, bool all_rays,
               WorkerPool& pool) noexcept;
   /// Nothing is kept yet: a frame had better ask, update again and then look.
   [[nodiscard]] bool cold() const noexcept { return kept_.empty(); }
@@ -55,6 +56,8 @@ class TexelLight {
     return std::numeric_limits<float>::quiet_NaN();
   }
 
+  /// Of the last update().
+  [[nodiscard]] RayCounts rays() const noexcept { return {rays_.load(), rejected_.load()}; }
   [[nodiscard]] std::size_t size() const noexcept { return kept_.size(); }
 
  private:
@@ -92,8 +95,9 @@ class TexelLight {
   };
 
   void start_over(float texel_m) noexcept;
-  void make_asked() noexcept;
-  void light_sides(const Snapshot& snapshot, std::size_t lamp) noexcept;
+  [[nodiscard]] bool make_asked() noexcept;
+  void light_sides(const Snapshot& snapshot, std::size_t lamp, WorkerPool& pool) noexcept;
+  void count(const RayCounts& counts) noexcept;
   void note_turned() noexcept;
   void tend(std::size_t first, std::size_t end, const Snapshot& snapshot, const LampInView& lamp,
             bool all_rays) noexcept;
@@ -125,6 +129,8 @@ class TexelLight {
   std::uint32_t frame_ = 0;
   std::size_t lamp_ = 0;
   float irradiance_w_m2_ = 0;
+  std::atomic<std::uint64_t> rays_{0};
+  std::atomic<std::uint64_t> rejected_{0};
 };
 
 }  // namespace engine
