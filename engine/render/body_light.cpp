@@ -16,6 +16,10 @@ constexpr int kPatchesAShare = 64;
 // Of the target's radius: 2 px of a target of 100 px.
 constexpr double kCubesARadius = 30.0;
 constexpr double kDirectionsARadian = 125.0;
+// By the cosine the mean direction is 48 deg off the normal.
+constexpr double kMeanCosine = 2.0 / 3.0;
+
+const EarthLight kNoCap;
 
 /// The nearest of fixed directions.
 Vector3f rounded(const Vector3d& unit) noexcept {
@@ -89,19 +93,44 @@ void BodyLight::gather(std::size_t patch, HemisphereBins::Values& arriving) cons
   }
 }
 
-void BodyLight::renew(Kept& kept, const Vector3f& toward, WorkerPool& pool) noexcept {
-  kept.toward = toward;
+/// Of the cap's light, what leaves the patch.
+float BodyLight::sent_on(std::size_t patch, const EarthLight& cap) const noexcept {
+  const SurfacePatches::Patch& p = patches_.patch(patch);
+  const auto seen = patches_.seen_from(patch);
+  HemisphereBins::FineValues light;
+  HemisphereBins::see(cap, p.axes, light);
+  double sum = 0;
+  for (std::size_t bin = 0; bin < HemisphereBins::kBins; ++bin) {
+    const auto rays = seen.subspan(bin * SurfacePatches::kRaysABin, SurfacePatches::kRaysABin);
+    const auto open = static_cast<double>(std::ranges::count(rays, SurfacePatches::kSky));
+    for (const float a : {0.0F, 0.5F})
+      for (const float b : {0.0F, 0.5F})
+        sum += 0.25 * open * static_cast<double>(light[HemisphereBins::fine(bin, a, b)]);
+  }
+  const double albedo = target_.facets.brdf(p.material).albedo(kMeanCosine);
+  return static_cast<float>(albedo * sum / static_cast<double>(SurfacePatches::kRays));
+}
+
+void BodyLight::renew(Kept& kept, const Lamp& lamp, const EarthLight& cap,
+                      WorkerPool& pool) noexcept {
+  kept.toward = rounded(lamp.toward.unit);
   const std::size_t n = patches_.size();
   const int shares = static_cast<int>((n + kPatchesAShare - 1) / kPatchesAShare);
-  pool.rows(0, shares, [&](int share) {
-    const std::size_t first = static_cast<std::size_t>(share) * kPatchesAShare;
-    ask(kept, first, std::min(n, first + kPatchesAShare));
-  });
+  if (cap.dark()) {
+    pool.rows(0, shares, [&](int share) {
+      const std::size_t first = static_cast<std::size_t>(share) * kPatchesAShare;
+      ask(kept, first, std::min(n, first + kPatchesAShare));
+    });
+  }
   each_patch(pool, [&](std::size_t p) {
     const SurfacePatches::Patch& patch = patches_.patch(p);
-    const double c = static_cast<double>(patch.normal.dot(toward));
-    const double albedo = c > 0.0 ? target_.facets.brdf(patch.material).albedo(c) : 0.0;
-    sent_[p] = static_cast<float>(c * albedo / kPi) * kept.lit_share[p];
+    if (cap.dark()) {
+      const double c = static_cast<double>(patch.normal.dot(kept.toward));
+      const double albedo = c > 0.0 ? target_.facets.brdf(patch.material).albedo(c) : 0.0;
+      sent_[p] = static_cast<float>(c * albedo / kPi) * kept.lit_share[p];
+    } else {
+      sent_[p] = sent_on(p, cap) / static_cast<float>(lamp.irradiance_w_m2);
+    }
     kept.leaving[p] = sent_[p];
     kept.bounced[p] = 0.0F;
     kept.arriving[p].fill(0.0F);
@@ -115,8 +144,7 @@ void BodyLight::renew(Kept& kept, const Vector3f& toward, WorkerPool& pool) noex
         kept.arriving[p][bin] += now[bin];
         sum += now[bin];
       }
-      // By the cosine the mean direction is 48 deg off the normal.
-      const double albedo = target_.facets.brdf(patches_.patch(p).material).albedo(2.0 / 3.0);
+      const double albedo = target_.facets.brdf(patches_.patch(p).material).albedo(kMeanCosine);
       next_[p] = static_cast<float>(albedo) * sum / HemisphereBins::kBins;
       kept.leaving[p] += next_[p];
       if (bounce < bounces_) kept.bounced[p] += next_[p];
@@ -133,8 +161,8 @@ void BodyLight::light_up(const Snapshot& snapshot, WorkerPool& pool) noexcept {
     // Not a number either.
     if (!(irradiance[k] > 0.0F)) irradiance[k] = 0.0F;
     if (irradiance[k] == 0.0F) continue;
-    const Vector3f toward = rounded(lamps[k]->toward.unit);
-    if (toward != lamps_[k].toward) renew(lamps_[k], toward, pool);
+    if (rounded(lamps[k]->toward.unit) != lamps_[k].toward)
+      renew(lamps_[k], *lamps[k], k == 1 ? snapshot.earth : kNoCap, pool);
   }
   each_patch(pool, [&](std::size_t p) {
     const SurfacePatches::Patch& patch = patches_.patch(p);

@@ -17,8 +17,8 @@ namespace engine {
 ///
 /// What bounces leaves a patch evenly, with the albedo of the direction that it came from, as
 /// BouncedLight has it; towards the camera a patch reflects it by its BRDF.
-/// Lamps are taken from the nearest of directions 8 mrad apart: what is kept is a function of
-/// these alone, so that a frame does not depend on those before it.
+/// Lamps are taken from the nearest of directions 8 mrad apart, and asked anew when that is another
+/// one. The Earth's cap, where the view has it, shines on patches from where the sky is open.
 /// Leaves out what took more than `bounces` bounces, and changes finer than a patch: those are
 /// TexelLight's.
 /// Thread: loop. Loop-safe but for the constructor. The target outlives it.
@@ -64,7 +64,9 @@ class BodyLight {
   };
   template <class Work>
   void each_patch(WorkerPool& pool, const Work& work) const noexcept;
-  void renew(Kept& kept, const Eigen::Vector3f& toward, WorkerPool& pool) noexcept;
+  /// `cap`: in place of the lamp, if not dark.
+  void renew(Kept& kept, const Lamp& lamp, const EarthLight& cap, WorkerPool& pool) noexcept;
+  [[nodiscard]] float sent_on(std::size_t patch, const EarthLight& cap) const noexcept;
   void ask(Kept& kept, std::size_t first, std::size_t end) const noexcept;
   void gather(std::size_t patch, HemisphereBins::Values& arriving) const noexcept;
 

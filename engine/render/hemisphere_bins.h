@@ -7,6 +7,7 @@
 #include <Eigen/Core>
 
 #include "engine/scene/brdf.h"
+#include "engine/scene/earth_light.h"
 
 namespace engine {
 
@@ -29,6 +30,10 @@ struct HemisphereBins {
     const std::size_t y = 2 * (bin / kSide) + (b < 0.5F ? 0 : 1);
     return y * kFineSide + x;
   }
+  /// What comes from the Earth's cap, in W/m^2/sr, to a surface of these axes (rows; the last one
+  /// is the normal): of each quarter at one place in it, at another one in each. The sum over all
+  /// is right to 1 %.
+  static void see(const EarthLight& cap, const Eigen::Matrix3f& axes, FineValues& out) noexcept;
 };
 
 /// How a surface sends to the camera what arrives by bins: eval() of its BRDF, summed up before.

@@ -1,7 +1,6 @@
 #include "engine/render/lamp_view.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <limits>
 
@@ -28,11 +27,8 @@ LampView::LampView(const Mesh& mesh)
       radius_m_(mesh.bounding_radius_m()),
       raster_(mesh.vertices.size(), mesh.triangles.size(), kSide / kBandRows),
       corners_(mesh.vertices.size()),
-      map_(std::size_t{kSide} * kSide),
-      nearness_(map_.size()),
-      covered_(mesh.triangles.size()),
-      seen_(mesh.triangles.size()),
-      states_(mesh.triangles.size(), Lit::kUnknown),
+      facets_(std::size_t{kSide} * kSide),
+      nearness_(facets_.size()),
       planes_(mesh.triangles.size()) {}
 
 void LampView::update(const Vector3d& toward, WorkerPool& pool) noexcept {
@@ -46,26 +42,16 @@ void LampView::update(const Vector3d& toward, WorkerPool& pool) noexcept {
     const Vector3d p = axes * mesh_.vertices[i].cast<double>();
     corners_[i] = {0.5 * kSide + steps_a_m * p.x(), 0.5 * kSide + steps_a_m * p.y(), p.z()};
   }
-  std::fill(covered_.begin(), covered_.end(), 0U);
-  std::fill(seen_.begin(), seen_.end(), 0U);
   // A direction that is no number does not fit: everything is asked for by rays.
   const int side = kSide;
   const bool fits = raster_.place(mesh_, corners_, side, side, kBandRows);
   if (fits) pool.rows(0, raster_.bands(), [this](int band) { draw(band); });
-  for (std::uint32_t f = 0; f < states_.size(); ++f) {
-    if (fits) {
-      judge(f, axes);
-    } else {
-      states_[f] = Lit::kUnknown;
-      planes_[f] = {std::numeric_limits<float>::quiet_NaN(), 0.0F, 0.0F};
-    }
-  }
+  constexpr float kNoNumber = std::numeric_limits<float>::quiet_NaN();
+  for (std::uint32_t f = 0; f < planes_.size(); ++f)
+    planes_[f] = fits ? plane_of(f, axes) : Plane{kNoNumber, 0.0F, 0.0F};
 }
 
-void LampView::judge(std::uint32_t facet, const Matrix3d& axes) noexcept {
-  states_[facet] = Lit::kUnknown;
-  if (covered_[facet] > 0 && seen_[facet] == covered_[facet]) states_[facet] = Lit::kYes;
-  if (covered_[facet] > 0 && seen_[facet] == 0) states_[facet] = Lit::kNo;
+LampView::Plane LampView::plane_of(std::uint32_t facet, const Matrix3d& axes) const noexcept {
   const auto& corner = mesh_.triangles[facet].corner;
   const Vector3d a = axes * mesh_.vertices[corner[0]].cast<double>();
   const Vector3d b = axes * mesh_.vertices[corner[1]].cast<double>() - a;
@@ -75,32 +61,15 @@ void LampView::judge(std::uint32_t facet, const Matrix3d& axes) noexcept {
   const double per_x = -normal.x() / normal.z();
   const double per_y = -normal.y() / normal.z();
   const double m_a_step = 2.0 * radius_m_ / kSide;
-  planes_[facet] = {
-      static_cast<float>(a.z() - per_x * (a.x() + radius_m_) - per_y * (a.y() + radius_m_)),
-      static_cast<float>(per_x * m_a_step), static_cast<float>(per_y * m_a_step)};
+  return {static_cast<float>(a.z() - per_x * (a.x() + radius_m_) - per_y * (a.y() + radius_m_)),
+          static_cast<float>(per_x * m_a_step), static_cast<float>(per_y * m_a_step)};
 }
 
 void LampView::draw(int band) noexcept {
   const std::size_t size = std::size_t{kSide} * kBandRows;
   const std::size_t first = static_cast<std::size_t>(band) * size;
-  const auto map = std::span(map_).subspan(first, size);
-  raster_.see(band, map, std::span(nearness_).subspan(first, size), covered_);
-  // Runs of one facet are counted at once.
-  std::uint32_t facet = TriangleRaster::kNone;
-  std::uint32_t run = 0;
-  const auto count = [&] {
-    if (facet != TriangleRaster::kNone)
-      std::atomic_ref(seen_[facet]).fetch_add(run, std::memory_order_relaxed);
-  };
-  for (const std::uint32_t next : map) {
-    if (next != facet) {
-      count();
-      facet = next;
-      run = 0;
-    }
-    ++run;
-  }
-  count();
+  raster_.see(band, std::span(facets_).subspan(first, size),
+              std::span(nearness_).subspan(first, size));
 }
 
 Lit LampView::places(std::uint32_t facet, const Eigen::Vector2f& low,

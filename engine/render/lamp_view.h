@@ -11,8 +11,8 @@ namespace engine {
 
 enum class Lit : std::uint8_t { kUnknown, kYes, kNo };
 
-/// What a parallel lamp sees of the target: which facets, and which places on them, it reaches.
-/// Only at edges of shadows has a ray to be asked.
+/// What a parallel lamp sees of the target: which places of facets it reaches. Only at edges of
+/// shadows has a ray to be asked.
 ///
 /// A map of the surfaces nearest to the lamp, on a lattice of 1024 steps. Places are in the light
 /// where nothing round them stands above their facet's plane, in the dark where everything does.
@@ -27,8 +27,6 @@ class LampView {
 
   void update(const Eigen::Vector3d& toward, WorkerPool& pool) noexcept;
 
-  /// Of the whole facet.
-  [[nodiscard]] Lit facet(std::uint32_t facet) const noexcept { return states_[facet]; }
   /// Where a place falls on the map, in steps; a linear function of the place.
   [[nodiscard]] Eigen::Vector2f on_map(const Eigen::Vector3f& place) const noexcept {
     return to_map_ * place + Eigen::Vector2f::Constant(0.5F * kSide);
@@ -47,7 +45,7 @@ class LampView {
   };
 
   void draw(int band) noexcept;
-  void judge(std::uint32_t facet, const Eigen::Matrix3d& axes) noexcept;
+  [[nodiscard]] Plane plane_of(std::uint32_t facet, const Eigen::Matrix3d& axes) const noexcept;
 
   const Mesh& mesh_;
   double radius_m_;
@@ -55,12 +53,9 @@ class LampView {
   Eigen::Matrix<float, 2, 3> to_map_ = Eigen::Matrix<float, 2, 3>::Zero();
   TriangleRaster raster_;
   std::vector<TriangleRaster::Corner> corners_;
-  std::vector<std::uint32_t> map_;      ///< facets
-  std::vector<float> nearness_;         ///< of these
-  std::vector<std::uint32_t> covered_;  ///< points, by facet
-  std::vector<std::uint32_t> seen_;     ///< of these
-  std::vector<Lit> states_;
-  std::vector<Plane> planes_;  ///< by facet
+  std::vector<std::uint32_t> facets_;  ///< over the map
+  std::vector<float> nearness_;        ///< of these
+  std::vector<Plane> planes_;          ///< by facet
 };
 
 }  // namespace engine

@@ -5,6 +5,8 @@
 #include <limits>
 #include <utility>
 
+#include "engine/core/constants.h"
+
 namespace engine {
 
 using Eigen::Vector2f;
@@ -12,16 +14,8 @@ using Eigen::Vector3f;
 
 namespace {
 
-// In each four points of a row one asks for a lamp; over four rows, each column once.
-constexpr int kAskEvery = 4;
-constexpr std::array<int, kAskEvery> kAsks = {0, 2, 1, 3};
-constexpr bool asks_first(int x, int y) noexcept {
-  return x % kAskEvery == kAsks[static_cast<std::size_t>(y % kAskEvery)];
-}
 // A frame is made again for texels that it asked for: once, and where they had to be made coarser.
 constexpr int kMostRounds = 4;
-// Of a cell's points of one facet: so few are asked at once.
-constexpr int kFewPoints = 6;
 
 std::size_t at(int i) noexcept { return static_cast<std::size_t>(i); }
 
@@ -36,6 +30,7 @@ LatticeRenderer::LatticeRenderer(const RenderSpec& spec, std::shared_ptr<TracedT
       body_light_(*target_, spec.bounces, pool),
       texels_(*target_, body_light_, spec.bounces),
       paths_(spec, target_, pool),
+      noise_(spec.camera.frame().grown_by(spec.grid.beyond_frame_px), spec.noise),
       pool_(pool) {
   const PixelRect all = spec.camera.frame().grown_by(spec.grid.beyond_frame_px);
   row_counts_.resize(at(all.height()));
@@ -44,12 +39,12 @@ LatticeRenderer::LatticeRenderer(const RenderSpec& spec, std::shared_ptr<TracedT
   ENSURE(per_px <= TriangleRaster::kMostBandRows && at(s * s) <= kMostCells);
   const std::size_t points = at(all.width() * per_px + TriangleRaster::kLanes) * at(per_px);
   for (int i = 0; i < pool.threads(); ++i) {
-    benches_.push_back(std::make_unique<Bench>());
+    benches_.push_back(std::make_unique<Bench>(view_, *target_, points));
     Bench& bench = *benches_.back();
     bench.seen.resize(points);
     bench.nearness.resize(points);
     bench.tones.reserve(at(per_px * per_px));
-    bench.doubts.reserve(points);
+    bench.tallies.resize(at(all.width()));
     bench.mirrors.reserve(points);
   }
 }
@@ -85,18 +80,24 @@ RenderReport LatticeRenderer::render(const Snapshot& snapshot, Budget budget,
   if (region.empty()) return report;
   constexpr double kNotKnown = std::numeric_limits<double>::quiet_NaN();
   report.add({"sun disc", spec_.sun_disc == SunDisc::kOff ? "none" : "glints", kNotKnown});
-  // Harmonics and the cap are the path tracer's: here they are the vector that stands for them.
-  const EarthshineModel model = snapshot.earthshine_rung.model;
+  cap_ = !snapshot.earth.dark() && spec_.bounces > 0;
+  // Harmonics stand for the cap; without bounces there are no texels for it.
   const bool is_lamp = snapshot.earth.dark();
-  report.add({"earthshine", name_of(is_lamp ? model : EarthshineModel::kVector),
-              is_lamp ? snapshot.earthshine_rung.error_e : kNotKnown});
+  const EarthshineModel taken = is_lamp ? snapshot.earthshine_rung.model
+                                : cap_  ? EarthshineModel::kCap
+                                        : EarthshineModel::kVector;
+  report.add(
+      {"earthshine", name_of(taken), is_lamp ? snapshot.earthshine_rung.error_e : kNotKnown});
+  texel_lamp_ = snapshot.sun.irradiance_w_m2 > 0.0 || cap_ ? 0 : 1;
   light_up(snapshot);
   if (spec_.bounces > 0) {
-    texel_lamp_ = snapshot.sun.irradiance_w_m2 > 0.0 ? 0 : 1;
     const TexelLight::LampInView lamp{texel_lamp_, lamp_views_[texel_lamp_]};
     const double px_m = snapshot.camera.m.norm() * spec_.camera.ifov_rad();
+    const auto cell_m = static_cast<float>(px_m / s);
     const auto update = [&] {
       const bool again = texels_.update(snapshot, lamp, px_m, spec_.settled, pool_);
+      const float across = std::max(1.0F, texels_.texel_m() / cell_m);
+      cells_alike_ = across * across;
       const RayCounts counts = texels_.rays();
       report.rays += counts.rays;
       report.rejected_rays += counts.rejected;
@@ -104,11 +105,14 @@ RenderReport LatticeRenderer::render(const Snapshot& snapshot, Budget budget,
     };
     bool again = update() || texels_.cold() || spec_.settled;
     for (int round = 0; round < kMostRounds && again; ++round) {
+      noise_.start(region, view_.points_a_pixel());
       pool_.rows(0, region.height(), [&](int row) { shade_row(snapshot, out, row); });
       again = update();
     }
   }
+  noise_.start(region, view_.points_a_pixel());
   pool_.rows(0, region.height(), [&](int row) { shade_row(snapshot, out, row); });
+  report.rho_mc = noise_.reached();
   for (int row = 0; row < region.height(); ++row) {
     const RowCounts& counts = row_counts_[at(row)];
     report.hits += counts.hits;
@@ -122,12 +126,15 @@ RenderReport LatticeRenderer::render(const Snapshot& snapshot, Budget budget,
 }
 
 void LatticeRenderer::light_up(const Snapshot& snapshot) noexcept {
-  target_->facets.light_up(snapshot, pool_,
+  BodyView direct = snapshot;
+  if (cap_) direct.earthshine.irradiance_w_m2 = 0.0;
+  target_->facets.light_up(direct, pool_,
                            spec_.sun_disc == SunDisc::kOff ? 0.0 : kSunAngularRadius_rad);
   const auto lamps = lamps_of(snapshot);
   for (std::size_t k = 0; k < kLamps; ++k) {
     toward_lamp_[k] = lamps[k]->toward.unit.cast<float>();
-    if (lamps[k]->irradiance_w_m2 > 0.0) lamp_views_[k].update(lamps[k]->toward.unit, pool_);
+    const bool asked = lamps_of(direct)[k]->irradiance_w_m2 > 0.0 || k == texel_lamp_;
+    if (asked) lamp_views_[k].update(lamps[k]->toward.unit, pool_);
   }
   body_light_.light_up(snapshot, pool_);
 }
@@ -135,22 +142,23 @@ void LatticeRenderer::light_up(const Snapshot& snapshot) noexcept {
 void LatticeRenderer::shade_row(const Snapshot& snapshot, Radiance& out, int index) noexcept {
   Bench& bench = take_bench();
   bench.counts = {};
-  bench.doubts.clear();
   bench.mirrors.clear();
   const Row row{snapshot, out, bench, index};
   view_.see(index, bench.seen, bench.nearness);
+  bench.doubts.start({bench.seen, index, toward_lamp_});
   const int s = spec_.grid.oversampling;
   for (int r = index * s; r < (index + 1) * s; ++r) {
-    const auto cells = out.grid.row(r);
-    std::fill(cells.begin(), cells.end(), 0.0F);
-    const auto cover = out.cover.row(r);
-    std::fill(cover.begin(), cover.end(), 0.0F);
+    std::ranges::fill(out.grid.row(r), 0.0F);
+    std::ranges::fill(out.cover.row(r), 0.0F);
   }
   const PixelRect region = out.region;
-  for (int column = 0; column < region.width(); ++column)
+  for (int column = 0; column < region.width(); ++column) {
+    bench.tallies[at(column)] = {};
     if (view_.footprint().marked(region.left + column, region.top + index))
       shade_pixel(row, column);
+  }
   settle(row);
+  tell_noise(row);
   row_counts_[at(index)] = bench.counts;
   bench.taken.store(false, std::memory_order_release);
 }
@@ -265,9 +273,18 @@ void LatticeRenderer::shade(const Row& row, int column, const Tone& tone) noexce
       tone.facet, static_cast<float>(column * n) + static_cast<float>(sum_x) / half_steps,
       static_cast<float>(row.index * n) + static_cast<float>(sum_y) / half_steps, direction);
   const PixelOnFacet pixel = pixel_on(tone.facet, column, row.index);
-  if (spec_.bounces > 0) add_bounced(row, column, tone, middle, pixel);
+  CellLight light{};
+  if (spec_.bounces > 0) add_kept(row, column, tone, middle, pixel, light);
   for (std::size_t k = 0; k < kLamps; ++k)
-    if (target_->facets.radiance(tone.facet)[k] > 0.0F) add_lamp(row, column, tone, k, pixel);
+    if (target_->facets.radiance(tone.facet)[k] > 0.0F)
+      add_lamp(row, column, tone, k, pixel, light);
+  LatticeNoise::Tally& tally = row.bench.tallies[at(column)];
+  for (std::size_t cell = 0; cell < at(s * s); ++cell) {
+    if (tone.in_cell[cell] == 0) continue;
+    const auto points = static_cast<float>(tone.in_cell[cell]);
+    add(row, column, cell, points, light[cell]);
+    tally.squares += points * light[cell] * light[cell];
+  }
 
   const float share =
       body_light_.mirror_share(middle.material, -middle.normal.dot(direction) / direction.norm());
@@ -294,9 +311,10 @@ LatticeRenderer::PixelOnFacet LatticeRenderer::pixel_on(std::uint32_t facet, int
   return {corner, place(n, 0) - corner, place(0, n) - corner};
 }
 
-/// By texels, and by patches where there is none yet.
-void LatticeRenderer::add_bounced(const Row& row, int column, const Tone& tone,
-                                  const SurfacePoint& middle, const PixelOnFacet& pixel) noexcept {
+/// What is kept on the body, by texels.
+void LatticeRenderer::add_kept(const Row& row, int column, const Tone& tone,
+                               const SurfacePoint& middle, const PixelOnFacet& pixel,
+                               CellLight& light) noexcept {
   const int s = spec_.grid.oversampling;
   const float per_half_step = 0.5F / static_cast<float>(view_.points_a_pixel());
   const auto weights = [&](const Vector3f& place) {
@@ -310,15 +328,19 @@ void LatticeRenderer::add_bounced(const Row& row, int column, const Tone& tone,
   const unsigned side = middle.normal.dot(front.normal) > 0.0F ? 0 : 1;
   const bool both = row.snapshot.earthshine.irradiance_w_m2 > 0.0 && texel_lamp_ == 0;
   const float other = both ? kept_by_patch(1, middle) : 0.0F;
+  const auto all = static_cast<float>(view_.points_a_pixel() * view_.points_a_pixel());
+  float variance = 0.0F;
   for (std::size_t cell = 0; cell < at(s * s); ++cell) {
     if (tone.in_cell[cell] == 0) continue;
     const auto points = static_cast<float>(tone.in_cell[cell]);
     const Vector2f place = corner + static_cast<float>(tone.sum_x[cell]) / points * per_half_x +
                            static_cast<float>(tone.sum_y[cell]) / points * per_half_y;
-    float light = texels_.at(tone.facet, side, place.x(), place.y());
-    if (std::isnan(light)) light = kept_by_patch(texel_lamp_, middle);
-    add(row, column, cell, points, light + other);
+    const TexelLight::Light kept = texels_.at(tone.facet, side, place.x(), place.y());
+    light[cell] = other + (std::isnan(kept.w_m2_sr) ? without_texel(row, middle) : kept.w_m2_sr);
+    const float noise = points / all * kept.noise_w_m2_sr;
+    variance += noise * noise;
   }
+  row.bench.tallies[at(column)].variance += cells_alike_ * variance;
 }
 
 float LatticeRenderer::kept_by_patch(std::size_t lamp, const SurfacePoint& place) const noexcept {
@@ -326,8 +348,17 @@ float LatticeRenderer::kept_by_patch(std::size_t lamp, const SurfacePoint& place
   return patch == SurfacePatches::kNone ? 0.0F : body_light_.to_camera(lamp)[patch];
 }
 
+/// By patches; and the cap as if nothing stood before it.
+float LatticeRenderer::without_texel(const Row& row, const SurfacePoint& place) const noexcept {
+  const float bounced = kept_by_patch(texel_lamp_, place);
+  if (!cap_) return bounced;
+  const double received_w_m2 = row.snapshot.earth.irradiance_w_m2(place.normal.cast<double>());
+  const double albedo = target_->facets.brdf(place.material).diffuse_albedo();
+  return bounced + static_cast<float>(received_w_m2 * albedo / kPi);
+}
+
 void LatticeRenderer::add_lamp(const Row& row, int column, const Tone& tone, std::size_t lamp,
-                               const PixelOnFacet& pixel) const noexcept {
+                               const PixelOnFacet& pixel, CellLight& light) const noexcept {
   const LampView& view = lamp_views_[lamp];
   const int s = spec_.grid.oversampling;
   const Vector2f corner = view.on_map(pixel.corner);
@@ -341,68 +372,28 @@ void LatticeRenderer::add_lamp(const Row& row, int column, const Tone& tone, std
     return view.places(tone.facet, from.cwiseMin(b).cwiseMin(c).cwiseMin(d),
                        from.cwiseMax(b).cwiseMax(c).cwiseMax(d));
   };
-  Lit whole = view.facet(tone.facet);
-  if (whole == Lit::kUnknown) whole = ask_map(corner, 1.0F);
+  const Lit whole = ask_map(corner, 1.0F);
   if (whole == Lit::kNo) return;
   const float cell_px = 1.0F / static_cast<float>(s);
-  const float light = target_->facets.radiance(tone.facet)[lamp];
+  const float direct = target_->facets.radiance(tone.facet)[lamp];
   for (std::size_t cell = 0; cell < at(s * s); ++cell) {
     if (tone.in_cell[cell] == 0) continue;
+    const auto x = static_cast<int>(cell) % s;
+    const auto y = static_cast<int>(cell) / s;
     Lit lit = whole;
-    if (lit == Lit::kUnknown) {
-      const auto x = static_cast<float>(static_cast<int>(cell) % s);
-      const auto y = static_cast<float>(static_cast<int>(cell) / s);
-      lit = ask_map(corner + x * cell_px * across + y * cell_px * down, cell_px);
-    }
-    if (lit == Lit::kYes) add(row, column, cell, static_cast<float>(tone.in_cell[cell]), light);
-    if (lit == Lit::kUnknown) doubt(row, column, tone, cell, lamp);
+    if (lit == Lit::kUnknown)
+      lit = ask_map(corner + static_cast<float>(x) * cell_px * across +
+                        static_cast<float>(y) * cell_px * down,
+                    cell_px);
+    if (lit == Lit::kYes) light[cell] += direct;
+    if (lit == Lit::kUnknown)
+      row.bench.doubts.add({.lamp = lamp,
+                            .facet = tone.facet,
+                            .column = column * s + x,
+                            .cell_row = y,
+                            .points = tone.in_cell[cell],
+                            .beside_w_m2_sr = light[cell]});
   }
-}
-
-void LatticeRenderer::doubt(const Row& row, int column, const Tone& tone, std::size_t cell,
-                            std::size_t lamp) const noexcept {
-  const int s = spec_.grid.oversampling;
-  const std::size_t index = row.bench.doubts.size();
-  row.bench.doubts.push_back({lamp, tone.facet, column * s + static_cast<int>(cell) % s,
-                              static_cast<int>(cell) / s, tone.in_cell[cell], 0, 0});
-  ask(row, index, false);
-}
-
-/// By rays: first one point in four, or all of few; then, at last, the others.
-void LatticeRenderer::ask(const Row& row, std::size_t doubt, bool rest) const noexcept {
-  Bench& bench = row.bench;
-  Doubt& d = bench.doubts[doubt];
-  const int side = view_.side();
-  const bool all = d.points <= kFewPoints;
-  for (int y = 0; y < side; ++y) {
-    const int bench_row = d.cell_row * side + y;
-    const std::uint32_t* seen = &bench.seen[at(bench_row) * view_.stride() + at(d.column * side)];
-    for (int x = 0; x < side; ++x) {
-      if (seen[x] != d.facet || (!all && asks_first(x, y) == rest)) continue;
-      const int i = d.column * side + x;
-      const int j = row.index * view_.points_a_pixel() + bench_row;
-      Vector3f direction;
-      const SurfacePoint point =
-          view_.place_on(d.facet, static_cast<float>(i) + TriangleRaster::x_in_step(j),
-                         static_cast<float>(j) + TriangleRaster::y_in_step(i), direction);
-      Queue& queue = bench.shadow_rays[d.lamp];
-      queue.rays.set(queue.used, point.start(), toward_lamp_[d.lamp]);
-      queue.who[at(queue.used)] = static_cast<std::uint32_t>(doubt);
-      ++d.asked;
-      if (++queue.used == RayPacket::kLanes) send_shadow_rays(bench, d.lamp);
-    }
-  }
-}
-
-void LatticeRenderer::send_shadow_rays(Bench& bench, std::size_t lamp) const noexcept {
-  Queue& queue = bench.shadow_rays[lamp];
-  const std::size_t used = at(std::exchange(queue.used, 0));
-  if (used == 0) return;
-  for (std::size_t i = used; i < RayPacket::kLanes; ++i) queue.rays.active[i] = false;
-  std::array<bool, RayPacket::kLanes> blocked{};
-  target_->scene.occluded(queue.rays, blocked, bench.counts.rays);
-  for (std::size_t i = 0; i < used; ++i)
-    if (blocked[i]) ++bench.doubts[queue.who[i]].hidden;
 }
 
 void LatticeRenderer::send_mirror_rays(const Row& row) const noexcept {
@@ -414,35 +405,48 @@ void LatticeRenderer::send_mirror_rays(const Row& row) const noexcept {
   std::array<MeshHit, RayPacket::kLanes> hits;
   target_->scene.intersect(queue.rays, hits, bench.counts.rays);
   for (std::size_t i = 0; i < used; ++i) {
-    if (hits[i].triangle == MeshHit::kNone) continue;
     const Vector3f direction(queue.rays.direction_x[i], queue.rays.direction_y[i],
                              queue.rays.direction_z[i]);
     const Mirror& mirror = bench.mirrors[queue.who[i]];
-    const float light = mirror.share * body_light_.leaving(target_->facets.at(hits[i], direction));
+    float light = 0.0F;
+    if (hits[i].triangle != MeshHit::kNone) {
+      light = body_light_.leaving(target_->facets.at(hits[i], direction));
+    } else if (cap_) {
+      light = static_cast<float>(
+          row.snapshot.earth.radiance_w_m2_sr(direction.cast<double>().normalized()));
+    }
     for (std::size_t cell = 0; cell < kMostCells; ++cell)
       if (mirror.in_cell[cell] > 0)
-        add(row, mirror.column, cell, static_cast<float>(mirror.in_cell[cell]), light);
+        add(row, mirror.column, cell, static_cast<float>(mirror.in_cell[cell]),
+            mirror.share * light);
   }
 }
 
 /// What is still open when the row's pixels are done.
-void LatticeRenderer::settle(const Row& row) const noexcept {
+void LatticeRenderer::settle(const Row& row) noexcept {
   Bench& bench = row.bench;
   send_mirror_rays(row);
-  for (std::size_t k = 0; k < kLamps; ++k) send_shadow_rays(bench, k);
-  for (std::size_t i = 0; i < bench.doubts.size(); ++i) {
-    const Doubt& d = bench.doubts[i];
-    // None of a few in four may be on the first points.
-    if (d.asked < d.points && (d.asked == 0 || (d.hidden > 0 && d.hidden < d.asked)))
-      ask(row, i, true);
-  }
-  for (std::size_t k = 0; k < kLamps; ++k) send_shadow_rays(bench, k);
   const int s = spec_.grid.oversampling;
-  for (const Doubt& d : bench.doubts) {
-    const auto asked = static_cast<float>(d.asked);
-    const float lit = static_cast<float>(d.points) * (asked - static_cast<float>(d.hidden)) / asked;
+  for (const ShadowDoubts::Doubt& d : bench.doubts.settle()) {
     const int cell = d.cell_row * s + d.column % s;
-    add(row, d.column / s, at(cell), lit, target_->facets.radiance(d.facet)[d.lamp]);
+    const float light = target_->facets.radiance(d.facet)[d.lamp];
+    add(row, d.column / s, at(cell), d.lit(), light);
+    bench.tallies[at(d.column / s)].squares += d.lit() * light * (light + 2.0F * d.beside_w_m2_sr);
+  }
+  bench.counts.rays.rays += bench.doubts.rays().rays;
+  bench.counts.rays.rejected += bench.doubts.rays().rejected;
+}
+
+void LatticeRenderer::tell_noise(const Row& row) noexcept {
+  const int s = spec_.grid.oversampling;
+  const int width = row.out.region.width();
+  for (int column = 0; column < width; ++column) {
+    const LatticeNoise::Tally& tally = row.bench.tallies[at(column)];
+    if (!(tally.squares > 0.0F)) continue;
+    float sum = 0.0F;
+    for (int y = row.index * s; y < (row.index + 1) * s; ++y)
+      for (int x = column * s; x < (column + 1) * s; ++x) sum += row.out.grid.at(x, y);
+    noise_.set(at(row.index) * at(width) + at(column), sum / static_cast<float>(s * s), tally);
   }
 }
 

@@ -7,9 +7,11 @@
 
 #include "engine/render/body_light.h"
 #include "engine/render/lamp_view.h"
+#include "engine/render/lattice_noise.h"
 #include "engine/render/lattice_view.h"
 #include "engine/render/path_tracer.h"
 #include "engine/render/render_spec.h"
+#include "engine/render/shadow_doubts.h"
 #include "engine/render/texel_light.h"
 
 namespace engine {
@@ -19,10 +21,11 @@ namespace engine {
 /// Camera and Sun are far: a facet's direct light is one number a frame (Facets), and what is left
 /// of a pixel is which share of it each facet covers and which of that is in the light. The shares
 /// come from a z-buffer of 4 to 64 points a cell (LatticeView), at a tenth of what rays cost. Where
-/// a lamp's own view cannot tell light from shadow (LampView), rays ask: one point in four, and
-/// all where these disagree. Light that bounces is kept on the body: the brighter lamp's by texels
-/// as fine as a third of a pixel (TexelLight), the other's by patches (BodyLight), and so is what
-/// has no texel yet. A target's first frame asks for its texels and is then made once more.
+/// a lamp's own view cannot tell light from shadow (LampView), rays ask (ShadowDoubts). Light that
+/// bounces is kept on the body: the brighter lamp's by texels as fine as a third of a pixel
+/// (TexelLight), the other's by patches (BodyLight), and so is what has no texel yet. Texels know
+/// which of the sky they see: the Earth's sunlit cap shines on them from there. A target's first
+/// frame asks for its texels and is then made once more.
 /// The lattice is the same in each frame: what it gets wrong, below 1/64 of a cell on an edge,
 /// shows as no noise.
 ///
@@ -54,40 +57,34 @@ class LatticeRenderer final : public Renderer {
     Eigen::Vector3f across;  ///< to the pixel's right
     Eigen::Vector3f down;
   };
-  /// Points of one facet in one cell, of which some are asked whether a lamp reaches them.
-  struct Doubt {
-    std::size_t lamp = 0;
-    std::uint32_t facet = 0;
-    int column = 0;  // of the cell in the region
-    int cell_row = 0;
-    std::uint16_t points = 0;
-    std::uint16_t asked = 0;
-    std::uint16_t hidden = 0;
-  };
   struct Mirror {
     int column = 0;  // of the pixel
     std::uint32_t facet = 0;
     float share = 0;
     std::array<std::uint16_t, kMostCells> in_cell{};
   };
-  /// Rays of one kind, until they are a packet.
+  /// Rays that were mirrored, until they are a packet.
   struct Queue {
     RayPacket rays;
-    std::array<std::uint32_t, RayPacket::kLanes> who{};  // index of a Doubt or a Mirror
+    std::array<std::uint32_t, RayPacket::kLanes> who{};  // index of a Mirror
     int used = 0;
   };
   struct RowCounts {
     RayCounts rays;
     std::uint64_t hits = 0;
   };
+  /// What each cell's points of a tone send.
+  using CellLight = std::array<float, kMostCells>;
   /// What a thread needs for a row of pixels.
   struct Bench {
+    Bench(const LatticeView& view, const TracedTarget& target, std::size_t points)
+        : doubts(view, target, points) {}
     std::vector<std::uint32_t> seen;  // by the row's points, as TriangleRaster gives them
     std::vector<float> nearness;
-    std::vector<Tone> tones;  // of a pixel
-    std::vector<Doubt> doubts;
+    std::vector<Tone> tones;                   // of a pixel
+    std::vector<LatticeNoise::Tally> tallies;  // by pixel of the row
+    ShadowDoubts doubts;
     std::vector<Mirror> mirrors;
-    std::array<Queue, kLamps> shadow_rays;
     Queue mirror_rays;
     RowCounts counts;
     std::atomic<bool> taken{false};
@@ -110,20 +107,18 @@ class LatticeRenderer final : public Renderer {
                int length) const noexcept;
   void shade_pixel(const Row& row, int column) noexcept;
   void shade(const Row& row, int column, const Tone& tone) noexcept;
-  void add_bounced(const Row& row, int column, const Tone& tone, const SurfacePoint& middle,
-                   const PixelOnFacet& pixel) noexcept;
+  void add_kept(const Row& row, int column, const Tone& tone, const SurfacePoint& middle,
+                const PixelOnFacet& pixel, CellLight& light) noexcept;
   [[nodiscard]] PixelOnFacet pixel_on(std::uint32_t facet, int column, int row) const noexcept;
   [[nodiscard]] float kept_by_patch(std::size_t lamp, const SurfacePoint& place) const noexcept;
+  [[nodiscard]] float without_texel(const Row& row, const SurfacePoint& place) const noexcept;
   void add_lamp(const Row& row, int column, const Tone& tone, std::size_t lamp,
-                const PixelOnFacet& pixel) const noexcept;
-  void doubt(const Row& row, int column, const Tone& tone, std::size_t cell,
-             std::size_t lamp) const noexcept;
-  void ask(const Row& row, std::size_t doubt, bool rest) const noexcept;
-  void settle(const Row& row) const noexcept;
-  void send_shadow_rays(Bench& bench, std::size_t lamp) const noexcept;
+                const PixelOnFacet& pixel, CellLight& light) const noexcept;
   void send_mirror_rays(const Row& row) const noexcept;
+  void settle(const Row& row) noexcept;
   void add(const Row& row, int column, std::size_t cell, float points,
            float radiance) const noexcept;
+  void tell_noise(const Row& row) noexcept;
 
   RenderSpec spec_;
   std::shared_ptr<TracedTarget> target_;
@@ -132,12 +127,15 @@ class LatticeRenderer final : public Renderer {
   BodyLight body_light_;
   TexelLight texels_;  ///< of texel_lamp_
   PathTracer paths_;
+  LatticeNoise noise_;
   WorkerPool& pool_;
   std::vector<std::unique_ptr<Bench>> benches_;  ///< one a thread
   std::vector<RowCounts> row_counts_;            ///< by row of pixels
   // Of the frame in hand.
   std::array<Eigen::Vector3f, kLamps> toward_lamp_;
   std::size_t texel_lamp_ = 0;  ///< the brighter one
+  bool cap_ = false;            ///< the Earth's light is its cap's, kept by texels
+  float cells_alike_ = 1;       ///< so many share what a texel has wrong
 };
 
 }  // namespace engine

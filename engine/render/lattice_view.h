@@ -28,7 +28,7 @@ class LatticeView {
   [[nodiscard]] std::size_t stride() const noexcept { return raster_.stride(); }
   /// Both buffers hold points_a_pixel() * stride() values.
   void see(int pixel_row, std::span<std::uint32_t> seen, std::span<float> nearness) const noexcept {
-    raster_.see(pixel_row, seen, nearness, {});
+    raster_.see(pixel_row, seen, nearness);
   }
   /// Where the line of sight through (x, y), in steps from the region's corner, meets the plane of
   /// a facet. `direction` is not of unit length.

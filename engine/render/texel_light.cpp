@@ -45,6 +45,21 @@ constexpr std::array<std::uint8_t, HemisphereBins::kBins> kOrder = [] {
   return order;
 }();
 
+/// The bins in an order of which each is near the one before: along a Z through each four (Morton).
+constexpr std::array<std::uint8_t, HemisphereBins::kBins> kNeighbours = [] {
+  std::array<std::uint8_t, HemisphereBins::kBins> order{};
+  for (unsigned i = 0; i < order.size(); ++i) {
+    unsigned x = 0;
+    unsigned y = 0;
+    for (unsigned bit = 0; bit < 3; ++bit) {
+      x |= (i >> (2 * bit) & 1U) << bit;
+      y |= (i >> (2 * bit + 1) & 1U) << bit;
+    }
+    order[i] = static_cast<std::uint8_t>(y * HemisphereBins::kSide + x);
+  }
+  return order;
+}();
+
 /// Two numbers for each ray of a texel: fractional parts of multiples (Roberts 2018, R2).
 class RayNumbers {
  public:
@@ -134,7 +149,7 @@ bool TexelLight::make_asked() noexcept {
     kept.sides.fill(kNone);
     const std::uint32_t material = target_.facets.on_side(kept.texel.facet, 0, 0, 0).material;
     states_.push_back({frame_, 0, false, body_light_.binned(material).even()});
-    values_.push_back(0.0F);
+    values_.push_back({});
     if (further_) patches_.emplace_back();
   }
   return true;
@@ -325,15 +340,11 @@ void TexelLight::ask_lamp(Kept& kept, const LampInView& lamp) noexcept {
     const std::uint32_t side = kept.sides[bin];
     if (side == kNone || !(sent_[side] > 0.0F)) continue;
     const std::uint32_t facet = side / 2;
-    Lit lit = lamp.view.facet(facet);
-    if (lit == Lit::kNo) continue;
     const SurfacePoint place =
         target_.facets.on_side(facet, static_cast<float>(kept.weights[bin][0]) / kWeightSteps,
                                static_cast<float>(kept.weights[bin][1]) / kWeightSteps, side % 2);
-    if (lit == Lit::kUnknown) {
-      const Eigen::Vector2f on_map = lamp.view.on_map(place.place);
-      lit = lamp.view.places(facet, on_map, on_map);
-    }
+    const Eigen::Vector2f on_map = lamp.view.on_map(place.place);
+    const Lit lit = lamp.view.places(facet, on_map, on_map);
     if (lit == Lit::kYes) kept.lit |= std::uint64_t{1} << bin;
     if (lit != Lit::kUnknown) continue;
     packet.set(static_cast<int>(lanes), place.start(), toward_lamp_[frame_ % kTurns]);
@@ -356,7 +367,9 @@ void TexelLight::renew(std::size_t k, bool changed, const Snapshot& snapshot,
   }
   if (!changed && phase % (state.even ? kSumEvenEvery : kSumEvery) != 0) return;
   weigh(kept_[k], snapshot, reflection);
-  values_[k] = summed_up(k, reflection);
+  values_[k].of_lamp = of_lamp(k, reflection);
+  values_[k].of_earth_w_m2_sr = of_earth(k, reflection);
+  if (changed) values_[k].noise = noise(k, reflection);
 }
 
 /// Over one facet the camera stands in the same direction.
@@ -377,32 +390,58 @@ void TexelLight::weigh(const Kept& kept, const Snapshot& snapshot,
   } else {
     brdf.weigh(out, reflection.weights);
   }
+  reflect_earth(snapshot.earth, place.normal, reflection);
 }
 
-float TexelLight::summed_up(std::size_t k, const Reflection& reflection) const noexcept {
+/// Over a body all look at the same Earth.
+void TexelLight::reflect_earth(const EarthLight& earth, const Vector3f& normal,
+                               Reflection& reflection) const noexcept {
+  reflection.sees_earth = false;
+  if (earth.dark() || !reflection.facing) return;
+  HemisphereBins::FineValues light;
+  HemisphereBins::see(earth, axes_of(normal), light);
+  for (std::size_t bin = 0; bin < kRays; ++bin) {
+    float sum = 0.0F;
+    for (const float a : {0.0F, 0.5F}) {
+      for (const float b : {0.0F, 0.5F}) {
+        const std::size_t fine = HemisphereBins::fine(bin, a, b);
+        sum += 0.25F * light[fine] * reflection.weights[fine];
+      }
+    }
+    reflection.earth_w_m2_sr[bin] = sum;
+    reflection.sees_earth = reflection.sees_earth || sum > 0.0F;
+  }
+}
+
+/// What a known bin's ray brings, for 1 W/m^2 of the lamp.
+float TexelLight::arriving(std::size_t k, std::size_t bin) const noexcept {
+  const Kept& kept = kept_[k];
+  const std::uint32_t side = kept.sides[bin];
+  if (side == kNone) return 0.0F;
+  float light = static_cast<float>(kept.lit >> bin & 1U) * sent_[side];
+  if (further_) light += body_light_.further(lamp_, patches_[k][bin]);
+  return light;
+}
+
+float TexelLight::of_lamp(std::size_t k, const Reflection& reflection) const noexcept {
   const Kept& kept = kept_[k];
   if (kept.known == 0) return std::numeric_limits<float>::quiet_NaN();
   if (!reflection.facing) return 0.0F;
-  HemisphereBins::Values arriving{};
+  float reflected = 0.0F;
   std::array<float, kQuarters> sum{};
   std::array<float, kQuarters> sent{};
   for (std::size_t bin = 0; bin < kRays; ++bin) {
     if ((kept.known >> bin & 1U) == 0) continue;
+    const float light = arriving(k, bin);
     sent[quarter_of(bin)] += 1.0F;
-    const std::uint32_t side = kept.sides[bin];
-    if (side == kNone) continue;
-    arriving[bin] = static_cast<float>(kept.lit >> bin & 1U) * sent_[side];
-    if (further_) arriving[bin] += body_light_.further(lamp_, patches_[k][bin]);
-    sum[quarter_of(bin)] += arriving[bin];
+    sum[quarter_of(bin)] += light;
+    reflected += reflection.weights[kept.fine[bin]] * light;
   }
-  float reflected = 0.0F;
+  if (kept.known == ~std::uint64_t{0}) return reflected;
+  // What is not known yet is like what is of the same quarter of the hemisphere: no quarter is
+  // without, the first rays have it so.
   for (std::size_t bin = 0; bin < kRays; ++bin) {
-    if ((kept.known >> bin & 1U) != 0) {
-      reflected += reflection.weights[kept.fine[bin]] * arriving[bin];
-      continue;
-    }
-    // What is not known yet is like what is of the same quarter of the hemisphere: no quarter is
-    // without, the first rays have it so.
+    if ((kept.known >> bin & 1U) != 0) continue;
     float weight = 0.0F;
     for (const float a : {0.0F, 0.5F})
       for (const float b : {0.0F, 0.5F})
@@ -410,6 +449,45 @@ float TexelLight::summed_up(std::size_t k, const Reflection& reflection) const n
     reflected += weight * sum[quarter_of(bin)] / sent[quarter_of(bin)];
   }
   return reflected;
+}
+
+/// By the bins that the sky is open to.
+float TexelLight::of_earth(std::size_t k, const Reflection& reflection) const noexcept {
+  if (!reflection.sees_earth) return 0.0F;
+  const Kept& kept = kept_[k];
+  float light = 0.0F;
+  std::array<float, kQuarters> open{};
+  std::array<float, kQuarters> sent{};
+  for (std::size_t bin = 0; bin < kRays; ++bin) {
+    if ((kept.known >> bin & 1U) == 0) continue;
+    sent[quarter_of(bin)] += 1.0F;
+    if (kept.sides[bin] != kNone) continue;
+    open[quarter_of(bin)] += 1.0F;
+    light += reflection.earth_w_m2_sr[bin];
+  }
+  for (std::size_t bin = 0; bin < kRays; ++bin)
+    if ((kept.known >> bin & 1U) == 0)
+      light += reflection.earth_w_m2_sr[bin] * open[quarter_of(bin)] / sent[quarter_of(bin)];
+  return light;
+}
+
+/// Successive differences stand for the variance within bins: Wolter 2007, Introduction to Variance
+/// Estimation, 2nd ed., section 8.2. They have that between neighbours too: an upper bound.
+float TexelLight::noise(std::size_t k, const Reflection& reflection) const noexcept {
+  const Kept& kept = kept_[k];
+  if (!reflection.facing) return 0.0F;
+  float squares = 0.0F;
+  float last = 0.0F;
+  int known = 0;
+  for (const std::size_t bin : kNeighbours) {
+    if ((kept.known >> bin & 1U) == 0) continue;
+    const float light = reflection.weights[kept.fine[bin]] * arriving(k, bin);
+    if (known++ > 0) squares += (light - last) * (light - last);
+    last = light;
+  }
+  if (known < 2) return 0.0F;
+  const auto n = static_cast<float>(known);
+  return static_cast<float>(kRays) * std::sqrt(squares / (2.0F * (n - 1.0F) * n));
 }
 
 }  // namespace engine

@@ -16,16 +16,17 @@
 
 namespace engine {
 
-/// Light of one lamp that comes to the target's surface by way of other places of it, kept by
-/// texels as fine as the camera's pixels: where surfaces stand close together BodyLight's patches
-/// are too coarse.
+/// Light of one lamp that comes to the target's surface by way of other places of it, and that of
+/// the Earth's sunlit cap where the sky is open to it, kept by texels as fine as the camera's
+/// pixels: where surfaces stand close together BodyLight's patches are too coarse.
 ///
 /// A texel has 64 rays, one to each of HemisphereBins, and keeps what they meet: fixed to the body,
 /// so found once. It is made in the frame after one that asked for it; it begins with eight of its
 /// rays and gets the others as frames go by. Which of the places met are in the light is asked
 /// anew when the lamp has turned by 8 mrad or 64 frames have passed; what goes to the camera is
 /// summed up every fourth frame, or every sixteenth where all directions are alike. So a frame
-/// depends on those before it, and on nothing else: neither on threads nor on a clock.
+/// depends on those before it, and on nothing else: neither on threads nor on a clock. How noisy a
+/// texel is is found when its places are asked anew, from how neighbouring bins differ.
 /// 131 072 texels are kept: for one more all begin anew, half as wide again, and when pixels have
 /// become that much wider or narrower.
 /// Light leaves a place evenly, as BouncedLight has it.
@@ -47,18 +48,26 @@ class TexelLight {
   /// Nothing is kept yet: a frame had better ask, update again and then look.
   [[nodiscard]] bool cold() const noexcept { return kept_.empty(); }
 
-  /// What bounces to the camera, in W/m^2/sr. Not a number where nothing is kept: asked for.
-  [[nodiscard]] float at(std::uint32_t facet, unsigned side, float second, float third) noexcept {
+  /// What goes to the camera.
+  struct Light {
+    float w_m2_sr = 0;
+    float noise_w_m2_sr = 0;  ///< rms, of having a ray a bin
+  };
+  /// Not a number where nothing is kept: asked for.
+  [[nodiscard]] Light at(std::uint32_t facet, unsigned side, float second, float third) noexcept {
     const std::uint32_t texel = grid_.at(facet, side, second, third);
     const std::uint32_t kept = kept_of_[texel];
-    if (kept != kNone) return irradiance_w_m2_ * values_[kept];
+    if (kept != kNone)
+      return {irradiance_w_m2_ * values_[kept].of_lamp + values_[kept].of_earth_w_m2_sr,
+              irradiance_w_m2_ * values_[kept].noise};
     std::atomic_ref(asked_[texel]).store(1, std::memory_order_relaxed);
-    return std::numeric_limits<float>::quiet_NaN();
+    return {std::numeric_limits<float>::quiet_NaN(), 0.0F};
   }
 
   /// Of the last update().
   [[nodiscard]] RayCounts rays() const noexcept { return {rays_.load(), rejected_.load()}; }
   [[nodiscard]] std::size_t size() const noexcept { return kept_.size(); }
+  [[nodiscard]] float texel_m() const noexcept { return texel_m_; }
 
  private:
   static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
@@ -80,6 +89,12 @@ class TexelLight {
     std::array<std::array<std::uint16_t, 2>, kRays> weights{};
   };
 
+  /// To the camera.
+  struct Value {
+    float of_lamp = 0;  ///< bounced, in W/m^2/sr for 1 W/m^2
+    float noise = 0;    ///< rms, of that
+    float of_earth_w_m2_sr = 0;
+  };
   /// What says whether there is anything to do: apart, for it is looked at in each frame.
   struct State {
     std::uint32_t lit_in = 0;  ///< frame
@@ -91,7 +106,9 @@ class TexelLight {
   struct Reflection {
     std::uint32_t side = kNone;
     bool facing = false;
+    bool sees_earth = false;
     HemisphereBins::FineValues weights{};
+    HemisphereBins::Values earth_w_m2_sr{};  ///< what each bin sends on of it
   };
 
   void start_over(float texel_m) noexcept;
@@ -108,7 +125,12 @@ class TexelLight {
   void renew(std::size_t k, bool changed, const Snapshot& snapshot, const LampInView& lamp,
              Reflection& reflection) noexcept;
   void weigh(const Kept& kept, const Snapshot& snapshot, Reflection& reflection) const noexcept;
-  [[nodiscard]] float summed_up(std::size_t k, const Reflection& reflection) const noexcept;
+  void reflect_earth(const EarthLight& earth, const Eigen::Vector3f& normal,
+                     Reflection& reflection) const noexcept;
+  [[nodiscard]] float of_lamp(std::size_t k, const Reflection& reflection) const noexcept;
+  [[nodiscard]] float of_earth(std::size_t k, const Reflection& reflection) const noexcept;
+  [[nodiscard]] float noise(std::size_t k, const Reflection& reflection) const noexcept;
+  [[nodiscard]] float arriving(std::size_t k, std::size_t bin) const noexcept;
 
   const TracedTarget& target_;
   const BodyLight& body_light_;
@@ -120,7 +142,7 @@ class TexelLight {
   std::vector<std::uint8_t> asked_;     ///< by texel
   std::vector<Kept> kept_;
   std::vector<State> states_;                              ///< by kept
-  std::vector<float> values_;                              ///< by kept, for 1 W/m^2
+  std::vector<Value> values_;                              ///< by kept
   std::vector<std::array<std::uint32_t, kRays>> patches_;  ///< met; only for further bounces
   std::vector<float> sent_;                                ///< by 2 * facet + side, for 1 W/m^2
   std::array<Eigen::Vector3f, kTurns> toward_lamp_;        ///< of the last frames

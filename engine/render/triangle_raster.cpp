@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cmath>
 #include <limits>
 
@@ -59,9 +58,8 @@ struct Block {
   int first_row = 0;  // in the pattern
 };
 
-[[gnu::always_inline]] inline std::uint32_t cover(const Block block, std::uint32_t* __restrict seen,
-                                                  float* __restrict nearness,
-                                                  std::size_t stride) noexcept {
+[[gnu::always_inline]] inline void cover(const Block block, std::uint32_t* __restrict seen,
+                                         float* __restrict nearness, std::size_t stride) noexcept {
   const Block b = block;
   constexpr int kLanes = TriangleRaster::kLanes;
   alignas(64) std::array<std::int32_t, kLanes> e0;
@@ -77,7 +75,6 @@ struct Block {
     near[l] = b.nearness + b.nearness_per_x * static_cast<float>(x) +
               b.nearness_per_y * static_cast<float>(y);
   }
-  alignas(64) std::array<std::int32_t, kLanes> points{};
   const std::uint32_t triangle = b.triangle;
   for (int j = 0; j < b.rows; ++j) {
     const std::int32_t x =
@@ -91,7 +88,6 @@ struct Block {
     for (std::size_t l = 0; l < kLanes; ++l) {
       const std::int32_t outside = ((e0[l] + d0) | (e1[l] + d1) | (e2[l] + d2)) >> 31;
       const float n = near[l] + dn;
-      points[l] -= ~outside;
       const bool wins = (outside == 0) & (n > nearness[l]);
       nearness[l] = wins ? n : nearness[l];
       seen[l] = wins ? triangle : seen[l];
@@ -99,24 +95,21 @@ struct Block {
     nearness += stride;
     seen += stride;
   }
-  std::int32_t covered = 0;
-  for (const std::int32_t p : points) covered += p;
-  return static_cast<std::uint32_t>(covered);
 }
 
-using Cover = std::uint32_t (*)(const Block&, std::uint32_t*, float*, std::size_t) noexcept;
+using Cover = void (*)(const Block&, std::uint32_t*, float*, std::size_t) noexcept;
 
-std::uint32_t cover_plain(const Block& b, std::uint32_t* s, float* n, std::size_t w) noexcept {
-  return cover(b, s, n, w);
+void cover_plain(const Block& b, std::uint32_t* s, float* n, std::size_t w) noexcept {
+  cover(b, s, n, w);
 }
 #if defined(__x86_64__)
-__attribute__((target("avx2"))) std::uint32_t cover_avx2(const Block& b, std::uint32_t* s, float* n,
-                                                         std::size_t w) noexcept {
-  return cover(b, s, n, w);
+__attribute__((target("avx2"))) void cover_avx2(const Block& b, std::uint32_t* s, float* n,
+                                                std::size_t w) noexcept {
+  cover(b, s, n, w);
 }
-__attribute__((target("avx512f,avx512vl,avx512bw,avx512dq,prefer-vector-width=512"))) std::uint32_t
+__attribute__((target("avx512f,avx512vl,avx512bw,avx512dq,prefer-vector-width=512"))) void
 cover_avx512(const Block& b, std::uint32_t* s, float* n, std::size_t w) noexcept {
-  return cover(b, s, n, w);
+  cover(b, s, n, w);
 }
 #endif
 
@@ -203,8 +196,8 @@ std::size_t TriangleRaster::bucket_of(std::uint32_t triangle) const noexcept {
   return levels_[static_cast<std::size_t>(k)].first_bucket + static_cast<std::size_t>(bucket);
 }
 
-void TriangleRaster::see(int band, std::span<std::uint32_t> seen, std::span<float> nearness,
-                         std::span<std::uint32_t> covered) const noexcept {
+void TriangleRaster::see(int band, std::span<std::uint32_t> seen,
+                         std::span<float> nearness) const noexcept {
   const std::size_t used = static_cast<std::size_t>(band_rows_) * stride_;
   ENSURE(seen.size() >= used && nearness.size() >= used);
   std::fill_n(seen.begin(), used, kNone);
@@ -216,14 +209,14 @@ void TriangleRaster::see(int band, std::span<std::uint32_t> seen, std::span<floa
     for (int b = std::max(0, here - 1); b <= here; ++b) {
       const std::size_t bucket = level.first_bucket + static_cast<std::size_t>(b);
       for (std::uint32_t i = bucket_begin_[bucket]; i < bucket_begin_[bucket + 1]; ++i)
-        see_triangle(sorted_[i], band * band_rows_, seen, nearness, covered);
+        see_triangle(sorted_[i], band * band_rows_, seen, nearness);
     }
   }
 }
 
 void TriangleRaster::see_triangle(std::uint32_t triangle, int band_row,
-                                  std::span<std::uint32_t> seen, std::span<float> nearness,
-                                  std::span<std::uint32_t> covered) const noexcept {
+                                  std::span<std::uint32_t> seen,
+                                  std::span<float> nearness) const noexcept {
   const auto& c = mesh_->triangles[triangle].corner;
   const Place& a = places_[c[0]];
   const Place* b = &places_[c[1]];
@@ -255,7 +248,6 @@ void TriangleRaster::see_triangle(std::uint32_t triangle, int band_row,
   block.first_row = first_row;
   block.nearness_per_x = static_cast<float>(per_x);
   block.nearness_per_y = static_cast<float>(per_y);
-  std::uint32_t points = 0;
   for (int column = first_column / kLanes * kLanes; column < end_column; column += kLanes) {
     const std::int64_t x = static_cast<std::int64_t>(column) * kStep;
     const std::int64_t y = static_cast<std::int64_t>(first_row) * kStep;
@@ -275,10 +267,8 @@ void TriangleRaster::see_triangle(std::uint32_t triangle, int band_row,
                                         per_y * static_cast<double>(y - a.y));
     const std::size_t at =
         static_cast<std::size_t>(first_row - band_row) * stride_ + static_cast<std::size_t>(column);
-    points += kCover(block, seen.data() + at, nearness.data() + at, stride_);
+    kCover(block, seen.data() + at, nearness.data() + at, stride_);
   }
-  if (!covered.empty() && points > 0)
-    std::atomic_ref(covered[triangle]).fetch_add(points, std::memory_order_relaxed);
 }
 
 }  // namespace engine

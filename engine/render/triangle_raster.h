@@ -54,10 +54,8 @@ class TriangleRaster {
   [[nodiscard]] std::size_t stride() const noexcept { return stride_; }
 
   /// The triangles that band `band` sees, row by row, kNone where there is none. Both buffers hold
-  /// band_rows * stride() values; `nearness` is scratch. `covered`, if not empty, has a count for
-  /// each triangle, to which the points are added that it covers, seen or not.
-  void see(int band, std::span<std::uint32_t> seen, std::span<float> nearness,
-           std::span<std::uint32_t> covered) const noexcept;
+  /// band_rows * stride() values; `nearness` is of what is seen.
+  void see(int band, std::span<std::uint32_t> seen, std::span<float> nearness) const noexcept;
 
  private:
   struct Place {
@@ -74,7 +72,7 @@ class TriangleRaster {
 
   [[nodiscard]] std::size_t bucket_of(std::uint32_t triangle) const noexcept;
   void see_triangle(std::uint32_t triangle, int first_row, std::span<std::uint32_t> seen,
-                    std::span<float> nearness, std::span<std::uint32_t> covered) const noexcept;
+                    std::span<float> nearness) const noexcept;
 
   const Mesh* mesh_ = nullptr;
   std::vector<Place> places_;

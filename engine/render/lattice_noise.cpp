@@ -1,0 +1,45 @@
+#include "engine/render/lattice_noise.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/core/contract.h"
+
+namespace engine {
+namespace {
+
+std::size_t area(const PixelRect& region) noexcept {
+  return region.empty()
+             ? 0
+             : static_cast<std::size_t>(region.width()) * static_cast<std::size_t>(region.height());
+}
+
+// Measured with 20 000 straight edges through pixels of 6 to 32 points a side: .61 to .83. On two
+// telescopes of 110 px: .9 to 1.7, for pixels have several edges.
+constexpr double kEdge = 1.0;
+
+}  // namespace
+
+LatticeNoise::LatticeNoise(const PixelRect& largest, const SensorNoise& noise)
+    : map_(largest, noise), mean_(area(largest)), variance_(area(largest)) {}
+
+void LatticeNoise::start(const PixelRect& region, int points_a_pixel_side) noexcept {
+  region_ = region;
+  const double n = points_a_pixel_side;
+  points_ = static_cast<float>(n * n);
+  edge_share_ = static_cast<float>(kEdge / (n * n * n));
+  ENSURE(area(region) <= mean_.size());
+  std::fill_n(mean_.begin(), area(region), 0.0F);
+  std::fill_n(variance_.begin(), area(region), 0.0F);
+}
+
+void LatticeNoise::set(std::size_t index, float mean_w_m2_sr, const Tally& tally) noexcept {
+  const float between = tally.squares / points_ - mean_w_m2_sr * mean_w_m2_sr;
+  mean_[index] = mean_w_m2_sr;
+  // A pixel of one tone has no edge, but for rounding.
+  variance_[index] = edge_share_ * std::max(between, 0.0F) + tally.variance;
+}
+
+NoiseReached LatticeNoise::reached() noexcept { return map_.measure(region_, mean_, variance_); }
+
+}  // namespace engine
