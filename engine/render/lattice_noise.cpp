@@ -21,13 +21,17 @@ constexpr double kEdge = 1.0;
 }  // namespace
 
 LatticeNoise::LatticeNoise(const PixelRect& largest, const SensorNoise& noise)
-    : map_(largest, noise), mean_(area(largest)), variance_(area(largest)) {}
+    : map_(largest, noise), noise_(noise), mean_(area(largest)), variance_(area(largest)) {}
 
-void LatticeNoise::start(const PixelRect& region, int points_a_pixel_side) noexcept {
+void LatticeNoise::start(const PixelRect& region, int points_a_pixel_side, double limit) noexcept {
   region_ = region;
   const double n = points_a_pixel_side;
   points_ = static_cast<float>(n * n);
   edge_share_ = static_cast<float>(kEdge / (n * n * n));
+  // Of a camera that is not known: infinite, or not a number.
+  const double scale = limit * limit / (map_.kept_variance() * noise_.e_per_radiance);
+  limit_dark_ = static_cast<float>(scale * noise_.dark_variance_e2 / noise_.e_per_radiance);
+  limit_lit_ = static_cast<float>(scale);
   ENSURE(area(region) <= mean_.size());
   std::fill_n(mean_.begin(), area(region), 0.0F);
   std::fill_n(variance_.begin(), area(region), 0.0F);

@@ -27,16 +27,27 @@ class LatticeNoise {
   /// No region is larger than `largest`.
   LatticeNoise(const PixelRect& largest, const SensorNoise& noise);
 
-  void start(const PixelRect& region, int points_a_pixel_side) noexcept;
+  /// `limit`: in the sensor's sigmas, see too_noisy().
+  void start(const PixelRect& region, int points_a_pixel_side, double limit) noexcept;
+  /// Whether independent parts of a pixel, so many, would have more than the limit if all of them
+  /// had this noise (rms) and light.
+  [[nodiscard]] bool too_noisy(float noise_w_m2_sr, float light_w_m2_sr,
+                               float parts) const noexcept {
+    return noise_w_m2_sr * noise_w_m2_sr > parts * (limit_dark_ + limit_lit_ * light_w_m2_sr);
+  }
   /// Pixel `index` of the region, row by row, has this mean.
   void set(std::size_t index, float mean_w_m2_sr, const Tally& tally) noexcept;
   [[nodiscard]] NoiseReached reached() noexcept;
 
  private:
   NoiseMap map_;
+  SensorNoise noise_;
   PixelRect region_;
   float points_ = 1;
   float edge_share_ = 0;  ///< of the variance between tones
+  // Variance of a pixel that is at the limit: at no light, and more for each W/m^2/sr.
+  float limit_dark_ = 0;
+  float limit_lit_ = 0;
   std::vector<float> mean_;
   std::vector<float> variance_;
 };

@@ -14,8 +14,10 @@ using Eigen::Vector3f;
 
 namespace {
 
-// A frame is made again for texels that it asked for: once, and where they had to be made coarser.
+// A frame is made again for texels that it asked for: once, where they had to be made coarser, and
+// if all is to be complete for each further set of rays.
 constexpr int kMostRounds = 4;
+constexpr int kMostSettledRounds = 10;
 
 std::size_t at(int i) noexcept { return static_cast<std::size_t>(i); }
 
@@ -89,6 +91,7 @@ RenderReport LatticeRenderer::render(const Snapshot& snapshot, Budget budget,
   report.add(
       {"earthshine", name_of(taken), is_lamp ? snapshot.earthshine_rung.error_e : kNotKnown});
   texel_lamp_ = snapshot.sun.irradiance_w_m2 > 0.0 || cap_ ? 0 : 1;
+  const double limit = budget.rho_mc > 0.0 ? budget.rho_mc : spec_.profile.rho_mc;
   light_up(snapshot);
   if (spec_.bounces > 0) {
     const TexelLight::LampInView lamp{texel_lamp_, lamp_views_[texel_lamp_]};
@@ -103,14 +106,15 @@ RenderReport LatticeRenderer::render(const Snapshot& snapshot, Budget budget,
       report.rejected_rays += counts.rejected;
       return again;
     };
+    const int most = spec_.settled ? kMostSettledRounds : kMostRounds;
     bool again = update() || texels_.cold() || spec_.settled;
-    for (int round = 0; round < kMostRounds && again; ++round) {
-      noise_.start(region, view_.points_a_pixel());
+    for (int round = 0; round < most && again; ++round) {
+      noise_.start(region, view_.points_a_pixel(), limit);
       pool_.rows(0, region.height(), [&](int row) { shade_row(snapshot, out, row); });
       again = update();
     }
   }
-  noise_.start(region, view_.points_a_pixel());
+  noise_.start(region, view_.points_a_pixel(), limit);
   pool_.rows(0, region.height(), [&](int row) { shade_row(snapshot, out, row); });
   report.rho_mc = noise_.reached();
   for (int row = 0; row < region.height(); ++row) {
@@ -142,6 +146,7 @@ void LatticeRenderer::light_up(const Snapshot& snapshot) noexcept {
 void LatticeRenderer::shade_row(const Snapshot& snapshot, Radiance& out, int index) noexcept {
   Bench& bench = take_bench();
   bench.counts = {};
+  bench.last_texel = {};
   bench.mirrors.clear();
   const Row row{snapshot, out, bench, index};
   view_.see(index, bench.seen, bench.nearness);
@@ -330,6 +335,12 @@ void LatticeRenderer::add_kept(const Row& row, int column, const Tone& tone,
   const float other = both ? kept_by_patch(1, middle) : 0.0F;
   const auto all = static_cast<float>(view_.points_a_pixel() * view_.points_a_pixel());
   float variance = 0.0F;
+  const float independent = static_cast<float>(s * s) / cells_alike_;
+  const auto& lamps = target_->facets.radiance(tone.facet);
+  const float brightest = std::max(lamps[0], lamps[1]);
+  if (std::exchange(row.bench.last_material, middle.material) != middle.material)
+    row.bench.last_texel = {};
+  TexelLight::Light& last = row.bench.last_texel;
   for (std::size_t cell = 0; cell < at(s * s); ++cell) {
     if (tone.in_cell[cell] == 0) continue;
     const auto points = static_cast<float>(tone.in_cell[cell]);
@@ -339,6 +350,13 @@ void LatticeRenderer::add_kept(const Row& row, int column, const Tone& tone,
     light[cell] = other + (std::isnan(kept.w_m2_sr) ? without_texel(row, middle) : kept.w_m2_sr);
     const float noise = points / all * kept.noise_w_m2_sr;
     variance += noise * noise;
+    if (kept.kept == TexelLight::kNone || kept.kept == last.kept) continue;
+    // By the texel before of the same stuff.
+    const auto sets = static_cast<float>(kept.sets);
+    if (last.sets > 0 &&
+        noise_.too_noisy(last.noise_of_one, brightest + light[cell], sets * independent))
+      texels_.want_more(kept);
+    last = kept;
   }
   row.bench.tallies[at(column)].variance += cells_alike_ * variance;
 }

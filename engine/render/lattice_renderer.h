@@ -86,6 +86,8 @@ class LatticeRenderer final : public Renderer {
     ShadowDoubts doubts;
     std::vector<Mirror> mirrors;
     Queue mirror_rays;
+    std::uint32_t last_material = 0;
+    TexelLight::Light last_texel;  // of that material
     RowCounts counts;
     std::atomic<bool> taken{false};
   };

@@ -29,6 +29,9 @@ class NoiseMap {
   [[nodiscard]] NoiseReached measure(const PixelRect& region, std::span<const float> mean,
                                      std::span<const float> variance) noexcept;
 
+  /// What is left after the optics of the variance of a pixel whose neighbours have as much.
+  [[nodiscard]] double kept_variance() const noexcept { return squares_; }
+
   struct Plan {
     double limit = 0;  ///< of the noise after the optics over the sensor's, rms over lit pixels
     int least = 1;     ///< samples a pixel

@@ -24,7 +24,11 @@ constexpr double kMostOff = 1.5;
 constexpr std::uint32_t kRaysAtOnce = 8;
 // Places that may be where a texel's rays start: first so many, and if none is good up to the last.
 constexpr std::array<std::size_t, 3> kTriedStarts = {0, 8, 72};
+// Sets that get rays in a frame: some, and a share of all.
 constexpr std::size_t kRefinedAFrame = 2048;
+constexpr std::size_t kRefinedOf = 64;
+constexpr std::uint32_t kMostSets = 8;
+constexpr std::uint32_t kNumberBits = 28;
 constexpr float kMostTurned_rad = 8e-3F;
 constexpr std::uint32_t kSumEvery = 4;
 constexpr std::uint32_t kSumEvenEvery = 16;
@@ -110,7 +114,9 @@ TexelLight::TexelLight(const TracedTarget& target, const BodyLight& body_light, 
       sent_(2 * target.mesh.triangles.size(), 0.0F) {
   kept_.reserve(kMostKept);
   states_.reserve(kMostKept);
+  own_.reserve(kMostKept);
   values_.reserve(kMostKept);
+  wanted_.reserve(kMostKept);
   if (further_) patches_.reserve(kMostKept);
   toward_lamp_.fill(Vector3f::Zero());
 }
@@ -120,7 +126,9 @@ void TexelLight::start_over(float texel_m) noexcept {
   if (texel_m_ > texel_m) least_m_ = texel_m_;
   kept_.clear();
   states_.clear();
+  own_.clear();
   values_.clear();
+  wanted_.clear();
   patches_.clear();
   refine_from_ = 0;
   std::fill_n(kept_of_.begin(), grid_.texels(), kNone);
@@ -143,16 +151,51 @@ bool TexelLight::make_asked() noexcept {
       return false;
     }
     kept_of_[number] = static_cast<std::uint32_t>(kept_.size());
-    Kept& kept = kept_.emplace_back();
-    kept.texel = grid_.texel(number);
-    kept.number = number;
-    kept.sides.fill(kNone);
-    const std::uint32_t material = target_.facets.on_side(kept.texel.facet, 0, 0, 0).material;
-    states_.push_back({frame_, 0, false, body_light_.binned(material).even()});
-    values_.push_back({});
-    if (further_) patches_.emplace_back();
+    keep(grid_.texel(number), number);
   }
   return true;
+}
+
+void TexelLight::keep(const TexelGrid::Texel& texel, std::uint32_t number) noexcept {
+  Kept& kept = kept_.emplace_back();
+  kept.texel = texel;
+  kept.number = number;
+  kept.sides.fill(kNone);
+  const std::uint32_t material = target_.facets.on_side(texel.facet, 0, 0, 0).material;
+  states_.push_back({.lit_in = frame_, .even = body_light_.binned(material).even()});
+  own_.push_back({});
+  values_.push_back({});
+  wanted_.push_back(0);
+  if (further_) patches_.emplace_back();
+}
+
+/// Further sets for texels that have done with theirs, while there is room.
+void TexelLight::make_wanted() noexcept {
+  const std::size_t n = kept_.size();
+  for (std::size_t k = 0; k < n && kept_.size() < kMostKept; ++k) {
+    if (wanted_[k] == 0) continue;
+    wanted_[k] = 0;
+    std::size_t last = k;
+    std::uint32_t sets = 1;
+    for (; states_[last].next != kNone; ++sets) last = states_[last].next;
+    if (sets == kMostSets || states_[last].rays != kRays) continue;
+    states_[last].next = static_cast<std::uint32_t>(kept_.size());
+    keep(TexelGrid::Texel(kept_[k].texel), kept_[k].number + (sets << kNumberBits));
+    states_.back().first = false;
+  }
+}
+
+/// Those that have waited longest.
+void TexelLight::choose_due() noexcept {
+  const std::size_t n = kept_.size();
+  std::size_t left = kRefinedAFrame + n / kRefinedOf;
+  for (std::size_t i = 0; i < n && left > 0; ++i) {
+    if (refine_from_ >= n) refine_from_ = 0;
+    State& state = states_[refine_from_++];
+    if (state.done()) continue;
+    state.due = true;
+    --left;
+  }
 }
 
 void TexelLight::light_sides(const Snapshot& snapshot, std::size_t lamp,
@@ -180,7 +223,10 @@ bool TexelLight::update(const Snapshot& snapshot, const LampInView& lamp, double
                         bool all_rays, WorkerPool& pool) noexcept {
   const float wished_m = std::max(static_cast<float>(px_m / kTexelsAPx), least_m_);
   if (!(wished_m <= kMostOff * texel_m_ && texel_m_ <= kMostOff * wished_m)) start_over(wished_m);
+  const std::size_t before = kept_.size();
   const bool had_room = make_asked();
+  make_wanted();
+  choose_due();
   rays_ = rejected_ = 0;
   ++frame_;
   const Lamp& light = *lamps_of(snapshot)[lamp.index];
@@ -192,13 +238,17 @@ bool TexelLight::update(const Snapshot& snapshot, const LampInView& lamp, double
   note_turned();
 
   const std::size_t n = kept_.size();
-  if (refine_from_ >= n) refine_from_ = 0;
-  pool.rows(0, static_cast<int>((n + kKeptAShare - 1) / kKeptAShare), [&](int share) {
-    const std::size_t first = static_cast<std::size_t>(share) * kKeptAShare;
-    tend(first, std::min(n, first + kKeptAShare), snapshot, lamp, all_rays);
-  });
-  refine_from_ += kRefinedAFrame;
-  return !had_room;
+  const int shares = static_cast<int>((n + kKeptAShare - 1) / kKeptAShare);
+  const auto each_share = [&](const auto& work) {
+    pool.rows(0, shares, [&](int share) {
+      const std::size_t first = static_cast<std::size_t>(share) * kKeptAShare;
+      work(first, std::min(n, first + kKeptAShare));
+    });
+  };
+  each_share(
+      [&](std::size_t first, std::size_t end) { tend(first, end, snapshot, lamp, all_rays); });
+  each_share([&](std::size_t first, std::size_t end) { combine(first, end); });
+  return !had_room || (all_rays && n > before);
 }
 
 void TexelLight::note_turned() noexcept {
@@ -231,10 +281,9 @@ std::uint64_t TexelLight::send_rays(std::size_t first, std::size_t end, bool all
   };
   for (std::size_t k = first; k < end; ++k) {
     State& state = states_[k];
-    const bool due = state.rays == 0 || (k >= refine_from_ && k < refine_from_ + kRefinedAFrame);
-    if (state.rays == kRays || !(due || all_rays)) continue;
+    const bool due = std::exchange(state.due, false) || state.rays == 0 || all_rays;
+    if (state.done() || !due) continue;
     Kept& kept = kept_[k];
-    if (kept.starts_known == 0) continue;
     changed |= std::uint64_t{1} << (k - first);
     const RayNumbers numbers(kept.number);
     const std::size_t last = all_rays ? kRays : state.rays + kRaysAtOnce;
@@ -296,7 +345,10 @@ void TexelLight::find_starts(std::size_t first, std::size_t end,
     }
     if (lanes > 0) send();
   }
-  for (std::size_t k = first; k < end; ++k) states_[k].tried = true;
+  for (std::size_t k = first; k < end; ++k) {
+    if (std::exchange(states_[k].tried, true)) continue;
+    states_[k].startless = kept_[k].starts_known == 0;
+  }
   if (counts.rays + counts.rejected > 0) count(counts);
 }
 
@@ -367,9 +419,34 @@ void TexelLight::renew(std::size_t k, bool changed, const Snapshot& snapshot,
   }
   if (!changed && phase % (state.even ? kSumEvenEvery : kSumEvery) != 0) return;
   weigh(kept_[k], snapshot, reflection);
-  values_[k].of_lamp = of_lamp(k, reflection);
-  values_[k].of_earth_w_m2_sr = of_earth(k, reflection);
-  if (changed) values_[k].noise = noise(k, reflection);
+  own_[k].of_lamp = of_lamp(k, reflection);
+  own_[k].of_earth_w_m2_sr = of_earth(k, reflection);
+  if (changed) own_[k].noise = noise(k, reflection);
+}
+
+/// The mean over a texel's sets, by their rays.
+void TexelLight::combine(std::size_t first, std::size_t end) noexcept {
+  for (std::size_t k = first; k < end; ++k) {
+    if (!states_[k].first) continue;
+    values_[k] = own_[k];
+    values_[k].noise_of_one = own_[k].noise;
+    if (states_[k].next == kNone) continue;
+    float rays = 0.0F;
+    Value sum{.sets = 0};
+    for (std::size_t set = k; set != kNone; set = states_[set].next) {
+      const auto weight = static_cast<float>(states_[set].rays);
+      ++sum.sets;
+      if (weight == 0.0F) continue;
+      rays += weight;
+      sum.of_lamp += weight * own_[set].of_lamp;
+      sum.of_earth_w_m2_sr += weight * own_[set].of_earth_w_m2_sr;
+      const float noise = weight * own_[set].noise;
+      sum.noise += noise * noise;
+      sum.noise_of_one += noise;
+    }
+    values_[k] = {sum.of_lamp / rays, std::sqrt(sum.noise) / rays, sum.of_earth_w_m2_sr / rays,
+                  sum.noise_of_one / rays, sum.sets};
+  }
 }
 
 /// Over one facet the camera stands in the same direction.

@@ -22,16 +22,15 @@ namespace engine {
 ///
 /// A texel has 64 rays, one to each of HemisphereBins, and keeps what they meet: fixed to the body,
 /// so found once. It is made in the frame after one that asked for it; it begins with eight of its
-/// rays and gets the others as frames go by. Which of the places met are in the light is asked
-/// anew when the lamp has turned by 8 mrad or 64 frames have passed; what goes to the camera is
-/// summed up every fourth frame, or every sixteenth where all directions are alike. So a frame
-/// depends on those before it, and on nothing else: neither on threads nor on a clock. How noisy a
-/// texel is is found when its places are asked anew, from how neighbouring bins differ.
-/// 131 072 texels are kept: for one more all begin anew, half as wide again, and when pixels have
-/// become that much wider or narrower.
-/// Light leaves a place evenly, as BouncedLight has it.
-/// Thread: update() the loop's, the rest any. Loop-safe but for the constructor. What it is given
-/// outlives it.
+/// rays and gets the others as frames go by, and when it has all and is wanted better, a further
+/// set of 64, up to eight. Which of the places met are in the light is asked anew when the lamp has
+/// turned by 8 mrad or 64 frames have passed; what goes to the camera is summed up every fourth
+/// frame, or every sixteenth where all directions are alike. So a frame depends on those before it,
+/// and on nothing else: neither on threads nor on a clock. How noisy a texel is is found when its
+/// places are asked anew, from how neighbouring bins differ. 131 072 sets are kept: for one more
+/// texel all begin anew, half as wide again, and when pixels have become that much wider or
+/// narrower. Light leaves a place evenly, as BouncedLight has it. Thread: update() the loop's, the
+/// rest any. Loop-safe but for the constructor. What it is given outlives it.
 class TexelLight {
  public:
   TexelLight(const TracedTarget& target, const BodyLight& body_light, int bounces);
@@ -42,26 +41,39 @@ class TexelLight {
     const LampView& view;
   };
   /// Makes what was asked for since the last call, and renews what is due. `all_rays`: at once.
-  /// True: there was no room, and all begins anew with coarser texels that have to be asked for.
+  /// True: look and update again, for there was no room and all begins anew with coarser texels
+  /// that have to be asked for, or there is more of what all rays are asked for.
   bool update(const Snapshot& snapshot, const LampInView& lamp, double px_m, bool all_rays,
               WorkerPool& pool) noexcept;
   /// Nothing is kept yet: a frame had better ask, update again and then look.
   [[nodiscard]] bool cold() const noexcept { return kept_.empty(); }
 
+  static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
   /// What goes to the camera.
   struct Light {
     float w_m2_sr = 0;
-    float noise_w_m2_sr = 0;  ///< rms, of having a ray a bin
+    float noise_w_m2_sr = 0;  ///< rms, of having few rays a bin
+    float noise_of_one = 0;   ///< the same, of one set of rays
+    std::uint32_t sets = 0;   ///< of rays
+    std::uint32_t kept = kNone;
   };
   /// Not a number where nothing is kept: asked for.
   [[nodiscard]] Light at(std::uint32_t facet, unsigned side, float second, float third) noexcept {
     const std::uint32_t texel = grid_.at(facet, side, second, third);
     const std::uint32_t kept = kept_of_[texel];
-    if (kept != kNone)
-      return {irradiance_w_m2_ * values_[kept].of_lamp + values_[kept].of_earth_w_m2_sr,
-              irradiance_w_m2_ * values_[kept].noise};
+    if (kept != kNone) {
+      const Value& value = values_[kept];
+      return {irradiance_w_m2_ * value.of_lamp + value.of_earth_w_m2_sr,
+              irradiance_w_m2_ * value.noise, irradiance_w_m2_ * value.noise_of_one, value.sets,
+              kept};
+    }
     std::atomic_ref(asked_[texel]).store(1, std::memory_order_relaxed);
-    return {std::numeric_limits<float>::quiet_NaN(), 0.0F};
+    return {std::numeric_limits<float>::quiet_NaN()};
+  }
+  /// For a Light with a number. What is asked of it may depend on other texels' light, but not on
+  /// its own: of those that miss something bright none would look noisy, and all be too dark.
+  void want_more(const Light& light) noexcept {
+    std::atomic_ref(wanted_[light.kept]).store(1, std::memory_order_relaxed);
   }
 
   /// Of the last update().
@@ -70,12 +82,12 @@ class TexelLight {
   [[nodiscard]] float texel_m() const noexcept { return texel_m_; }
 
  private:
-  static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
   static constexpr std::size_t kRays = HemisphereBins::kBins;
   static constexpr std::uint32_t kTurns = 64;
 
   static constexpr std::size_t kStarts = 4;
 
+  /// A set of rays.
   struct Kept {
     TexelGrid::Texel texel;
     std::uint32_t number = 0;
@@ -94,13 +106,21 @@ class TexelLight {
     float of_lamp = 0;  ///< bounced, in W/m^2/sr for 1 W/m^2
     float noise = 0;    ///< rms, of that
     float of_earth_w_m2_sr = 0;
+    float noise_of_one = 0;
+    std::uint32_t sets = 1;
   };
   /// What says whether there is anything to do: apart, for it is looked at in each frame.
   struct State {
-    std::uint32_t lit_in = 0;  ///< frame
-    std::uint8_t rays = 0;     ///< sent
-    bool tried = false;        ///< starts have been looked for
-    bool even = false;         ///< BinnedBrdf::even()
+    std::uint32_t lit_in = 0;    ///< frame
+    std::uint32_t next = kNone;  ///< a further set of the same texel's
+    std::uint8_t rays = 0;       ///< sent
+    bool tried = false;          ///< starts have been looked for
+    bool even = false;           ///< BinnedBrdf::even()
+    bool due = false;            ///< to get rays in this frame
+    bool first = true;           ///< of its texel's sets
+    bool startless = false;
+    /// None of its rays are left.
+    [[nodiscard]] bool done() const noexcept { return rays == kRays || startless; }
   };
   /// How the last side that a thread was at reflects to the camera.
   struct Reflection {
@@ -113,6 +133,10 @@ class TexelLight {
 
   void start_over(float texel_m) noexcept;
   [[nodiscard]] bool make_asked() noexcept;
+  void make_wanted() noexcept;
+  void keep(const TexelGrid::Texel& texel, std::uint32_t number) noexcept;
+  void choose_due() noexcept;
+  void combine(std::size_t first, std::size_t end) noexcept;
   void light_sides(const Snapshot& snapshot, std::size_t lamp, WorkerPool& pool) noexcept;
   void count(const RayCounts& counts) noexcept;
   void note_turned() noexcept;
@@ -142,7 +166,9 @@ class TexelLight {
   std::vector<std::uint8_t> asked_;     ///< by texel
   std::vector<Kept> kept_;
   std::vector<State> states_;                              ///< by kept
-  std::vector<Value> values_;                              ///< by kept
+  std::vector<Value> own_;                                 ///< by kept, of its rays alone
+  std::vector<Value> values_;                              ///< of all sets, where it is the first
+  std::vector<std::uint8_t> wanted_;                       ///< by kept, as asked_
   std::vector<std::array<std::uint32_t, kRays>> patches_;  ///< met; only for further bounces
   std::vector<float> sent_;                                ///< by 2 * facet + side, for 1 W/m^2
   std::array<Eigen::Vector3f, kTurns> toward_lamp_;        ///< of the last frames

@@ -290,6 +290,42 @@ TEST(LatticeRenderer, BouncesAddWhatPathsFind) {
   EXPECT_NEAR(sum_of(lattice.render(snapshot)) / sum_of(a), 1.0, 1e-5);
 }
 
+TEST(LatticeRenderer, TexelsThatAreTooNoisyGetRaysUntilTheyAreNotAndNoneGetsDarker) {
+  // Two bright strips before a dark wall: each of its texels sees them in a bin or two, or misses
+  // them. If those that met one were asked for more, the others would pull the mean down.
+  Mesh mesh;
+  add_plate(mesh, "black", {0, -6, -3}, {0, 12, 0}, {0, 0, 6});
+  add_plate(mesh, "white", {2, -6, -1}, {1.5, 0, 0}, {0, 12, 0});
+  add_plate(mesh, "white", {2, -6, -2}, {1.5, 0, 0}, {0, 12, 0});
+  const std::vector<Material> materials = {lambert_material("black", 0.3),
+                                           lambert_material("white", 0.9)};
+  Snapshot snapshot = test_support::view_from({kRange_m, 0, 0}, {-1, 0, 0}, {0, 0, 1});
+  snapshot.sun = lamp({-0.02, 0, 1}, kSun_w_m2);  // grazes the wall's back: it is dark
+  RenderSpec spec = spec_of(96, 1);
+  spec.settled = true;
+  Rig plain(spec, mesh, materials);
+  const double plain_light = sum_of(plain.render(snapshot));
+  EXPECT_TRUE(std::isnan(plain.report.rho_mc.rms));  // of a camera that is not known
+  spec.noise = {.e_per_radiance = 300.0, .dark_variance_e2 = 35.0, .full_well_e = 1e9};
+  spec.profile.rho_mc = 1e3;
+  Rig content(spec, mesh, materials);
+  EXPECT_EQ(sum_of(content.render(snapshot)), plain_light);
+  spec.profile.rho_mc = 0.05;
+  Rig wanting(spec, mesh, materials);
+  const double light = sum_of(wanting.render(snapshot));
+  EXPECT_LT(wanting.report.rho_mc.rms, 0.6 * content.report.rho_mc.rms);
+  EXPECT_GT(wanting.report.rays, 3 * content.report.rays);
+  WorkerPool pool(2);
+  RenderSpec reference = spec_of(96, 1);
+  reference.bounce_share = 1.0;
+  PathTracer paths(reference, std::make_shared<TracedTarget>(mesh, materials), pool);
+  Radiance b;
+  (void)paths.render(snapshot, {600}, b);
+  // Some 3500 px of 9 texels with 64 rays, of which 1.5 meet light: .5 %, three times.
+  EXPECT_NEAR(plain_light / sum_of(b), 1.0, 0.015);
+  EXPECT_NEAR(light / sum_of(b), 1.0, 0.015);
+}
+
 TEST(LatticeRenderer, FramesAreTheSameOnAnyNumberOfThreads) {
   // What is kept grows from frame to frame: in the same way, whoever does it.
   const auto materials = telescope_materials();
