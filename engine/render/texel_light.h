@@ -11,7 +11,7 @@
 #include "engine/core/worker_pool.h"
 #include "engine/render/body_light.h"
 #include "engine/render/lamp_view.h"
-#include "engine/render/texel_grid.h"
+#include "engine/render/texel_rays.h"
 #include "engine/scene/snapshot.h"
 
 namespace engine {
@@ -20,17 +20,19 @@ namespace engine {
 /// the Earth's sunlit cap where the sky is open to it, kept by texels as fine as the camera's
 /// pixels: where surfaces stand close together BodyLight's patches are too coarse.
 ///
-/// A texel has 64 rays, one to each of HemisphereBins, and keeps what they meet: fixed to the body,
-/// so found once. It is made in the frame after one that asked for it; it begins with eight of its
-/// rays and gets the others as frames go by, and when it has all and is wanted better, a further
-/// set of 64, up to eight. Which of the places met are in the light is asked anew when the lamp has
-/// turned by 8 mrad or 64 frames have passed; what goes to the camera is summed up every fourth
-/// frame, or every sixteenth where all directions are alike. So a frame depends on those before it,
-/// and on nothing else: neither on threads nor on a clock. How noisy a texel is is found when its
-/// places are asked anew, from how neighbouring bins differ. 131 072 sets are kept: for one more
-/// texel all begin anew, half as wide again, and when pixels have become that much wider or
-/// narrower. Light leaves a place evenly, as BouncedLight has it. Thread: update() the loop's, the
-/// rest any. Loop-safe but for the constructor. What it is given outlives it.
+/// A texel has 64 rays (TexelRays). It is made in the frame after one that asked for it; it begins
+/// with eight of its rays and gets the others as frames go by, and when it has all and is wanted
+/// better a further set, up to eight. Which of the places met are in the light is asked anew when
+/// the lamp has turned by 8 mrad or 64 frames have passed; what goes to the camera is summed up
+/// every fourth frame, or every sixteenth where all directions are alike. So a frame depends on
+/// those before it, and on nothing else: neither on threads nor on a clock.
+/// How noisy a texel is is found when its places are asked anew, from how neighbouring bins differ.
+/// Where there is no room for a texel all begin anew, half as wide again; so they do when pixels
+/// have become that much wider or narrower.
+///
+/// Light leaves a place evenly, as BouncedLight has it.
+/// Thread: update() the loop's, the rest any. Loop-safe but for the constructor. What it is given
+/// outlives it.
 class TexelLight {
  public:
   TexelLight(const TracedTarget& target, const BodyLight& body_light, int bounces);
@@ -46,9 +48,9 @@ class TexelLight {
   bool update(const Snapshot& snapshot, const LampInView& lamp, double px_m, bool all_rays,
               WorkerPool& pool) noexcept;
   /// Nothing is kept yet: a frame had better ask, update again and then look.
-  [[nodiscard]] bool cold() const noexcept { return kept_.empty(); }
+  [[nodiscard]] bool cold() const noexcept { return rays_.size() == 0; }
 
-  static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
+  static constexpr std::uint32_t kNone = TexelRays::kNone;
   /// What goes to the camera.
   struct Light {
     float w_m2_sr = 0;
@@ -60,7 +62,7 @@ class TexelLight {
   /// Not a number where nothing is kept: asked for.
   [[nodiscard]] Light at(std::uint32_t facet, unsigned side, float second, float third) noexcept {
     const std::uint32_t texel = grid_.at(facet, side, second, third);
-    const std::uint32_t kept = kept_of_[texel];
+    const std::uint32_t kept = first_of_[texel];
     if (kept != kNone) {
       const Value& value = values_[kept];
       return {irradiance_w_m2_ * value.of_lamp + value.of_earth_w_m2_sr,
@@ -77,29 +79,13 @@ class TexelLight {
   }
 
   /// Of the last update().
-  [[nodiscard]] RayCounts rays() const noexcept { return {rays_.load(), rejected_.load()}; }
-  [[nodiscard]] std::size_t size() const noexcept { return kept_.size(); }
+  [[nodiscard]] RayCounts rays() const noexcept { return counts_; }
+  [[nodiscard]] std::size_t size() const noexcept { return rays_.size(); }
   [[nodiscard]] float texel_m() const noexcept { return texel_m_; }
 
  private:
-  static constexpr std::size_t kRays = HemisphereBins::kBins;
+  static constexpr std::size_t kRays = TexelRays::kRays;
   static constexpr std::uint32_t kTurns = 64;
-
-  static constexpr std::size_t kStarts = 4;
-
-  /// A set of rays.
-  struct Kept {
-    TexelGrid::Texel texel;
-    std::uint32_t number = 0;
-    std::uint64_t known = 0;                             ///< bins whose rays were sent
-    std::uint64_t lit = 0;                               ///< of the places met
-    std::array<std::array<float, 2>, kStarts> starts{};  ///< of rays: places in the texel
-    std::uint32_t starts_known = 0;
-    // By bin: where its ray went, and what it met.
-    std::array<std::uint8_t, kRays> fine{};    ///< of HemisphereBins
-    std::array<std::uint32_t, kRays> sides{};  ///< 2 * facet + side, or kNone
-    std::array<std::array<std::uint16_t, 2>, kRays> weights{};
-  };
 
   /// To the camera.
   struct Value {
@@ -113,14 +99,8 @@ class TexelLight {
   struct State {
     std::uint32_t lit_in = 0;    ///< frame
     std::uint32_t next = kNone;  ///< a further set of the same texel's
-    std::uint8_t rays = 0;       ///< sent
-    bool tried = false;          ///< starts have been looked for
     bool even = false;           ///< BinnedBrdf::even()
-    bool due = false;            ///< to get rays in this frame
     bool first = true;           ///< of its texel's sets
-    bool startless = false;
-    /// None of its rays are left.
-    [[nodiscard]] bool done() const noexcept { return rays == kRays || startless; }
   };
   /// How the last side that a thread was at reflects to the camera.
   struct Reflection {
@@ -138,17 +118,13 @@ class TexelLight {
   void choose_due() noexcept;
   void combine(std::size_t first, std::size_t end) noexcept;
   void light_sides(const Snapshot& snapshot, std::size_t lamp, WorkerPool& pool) noexcept;
-  void count(const RayCounts& counts) noexcept;
   void note_turned() noexcept;
   void tend(std::size_t first, std::size_t end, const Snapshot& snapshot, const LampInView& lamp,
             bool all_rays) noexcept;
-  [[nodiscard]] std::uint64_t send_rays(std::size_t first, std::size_t end, bool all_rays) noexcept;
-  void find_starts(std::size_t first, std::size_t end, const Snapshot& snapshot) noexcept;
-  void follow(const RayPacket& packet, std::span<const std::pair<Kept*, std::size_t>> who) noexcept;
-  void ask_lamp(Kept& kept, const LampInView& lamp) noexcept;
   void renew(std::size_t k, bool changed, const Snapshot& snapshot, const LampInView& lamp,
              Reflection& reflection) noexcept;
-  void weigh(const Kept& kept, const Snapshot& snapshot, Reflection& reflection) const noexcept;
+  void weigh(const TexelGrid::Texel& texel, const Snapshot& snapshot,
+             Reflection& reflection) const noexcept;
   void reflect_earth(const EarthLight& earth, const Eigen::Vector3f& normal,
                      Reflection& reflection) const noexcept;
   [[nodiscard]] float of_lamp(std::size_t k, const Reflection& reflection) const noexcept;
@@ -161,24 +137,22 @@ class TexelLight {
   bool further_;
   TexelGrid grid_;
   float texel_m_ = 0;
-  float least_m_ = 0;                   ///< there is no room for finer texels
-  std::vector<std::uint32_t> kept_of_;  ///< by texel
-  std::vector<std::uint8_t> asked_;     ///< by texel
-  std::vector<Kept> kept_;
-  std::vector<State> states_;                              ///< by kept
-  std::vector<Value> own_;                                 ///< by kept, of its rays alone
-  std::vector<Value> values_;                              ///< of all sets, where it is the first
-  std::vector<std::uint8_t> wanted_;                       ///< by kept, as asked_
-  std::vector<std::array<std::uint32_t, kRays>> patches_;  ///< met; only for further bounces
-  std::vector<float> sent_;                                ///< by 2 * facet + side, for 1 W/m^2
-  std::array<Eigen::Vector3f, kTurns> toward_lamp_;        ///< of the last frames
-  std::array<bool, kTurns> turned_{};                      ///< of these: too far since
+  float least_m_ = 0;  ///< there is no room for finer texels
+  TexelRays rays_;
+  std::vector<std::uint32_t> first_of_;              ///< set of rays, by texel
+  std::vector<std::uint8_t> asked_;                  ///< by texel
+  std::vector<State> states_;                        ///< by set
+  std::vector<Value> own_;                           ///< by set, of its rays alone
+  std::vector<Value> values_;                        ///< of all sets, where it is the first
+  std::vector<std::uint8_t> wanted_;                 ///< by set, as asked_
+  std::vector<float> sent_;                          ///< by 2 * facet + side, for 1 W/m^2
+  std::array<Eigen::Vector3f, kTurns> toward_lamp_;  ///< of the last frames
+  std::array<bool, kTurns> turned_{};                ///< of these: too far since
   std::size_t refine_from_ = 0;
   std::uint32_t frame_ = 0;
   std::size_t lamp_ = 0;
   float irradiance_w_m2_ = 0;
-  std::atomic<std::uint64_t> rays_{0};
-  std::atomic<std::uint64_t> rejected_{0};
+  RayCounts counts_;
 };
 
 }  // namespace engine
