@@ -1,6 +1,7 @@
 #include "engine/render/lamp_view.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -19,6 +20,16 @@ constexpr double kDirectionsARadian = 1000.0;
 constexpr float kAbove_steps = 0.05F;
 constexpr float kAcross_steps = 0.25F;
 constexpr int kMostSteps = 24;
+
+// By column of the map.
+constexpr unsigned kColumns = 1024;
+constexpr std::array<float, kColumns> kYInStep = [] {
+  std::array<float, kColumns> y{};
+  for (std::size_t i = 0; i < y.size(); ++i)
+    y[i] = static_cast<float>(TriangleRaster::kPlaceInStep[i % TriangleRaster::kPeriod]) /
+           TriangleRaster::kStep;
+  return y;
+}();
 
 }  // namespace
 
@@ -74,6 +85,7 @@ void LampView::draw(int band) noexcept {
 
 Lit LampView::places(std::uint32_t facet, const Eigen::Vector2f& low,
                      const Eigen::Vector2f& high) const noexcept {
+  static_assert(kColumns == kSide);
   // With all points round the rectangle; not off the map, nor a number that is none.
   const float end = kSide - 2.0F;
   if (!(low.x() >= 1.0F && low.y() >= 1.0F && high.x() < end && high.y() < end))
@@ -86,23 +98,25 @@ Lit LampView::places(std::uint32_t facet, const Eigen::Vector2f& low,
   const Plane& plane = planes_[facet];
   const float margin = kAbove_steps * 2.0F * static_cast<float>(radius_m_) / kSide +
                        kAcross_steps * (std::abs(plane.per_x) + std::abs(plane.per_y));
-  bool all_above = true;
-  bool any_above = false;
+  // No number for facets seen edge-on, and where the lamp's direction is none.
+  if (!(margin < std::numeric_limits<float>::infinity())) return Lit::kUnknown;
+  const int columns = right - left;
+  int above = 0;
+  int asked = 0;
   for (int j = top; j < bottom; ++j) {
     const float* nearness = &nearness_[static_cast<std::size_t>(j) * kSide];
-    const float x_in_step = TriangleRaster::x_in_step(j);
-    const float row = plane.at_zero + margin + plane.per_y * static_cast<float>(j);
+    const float row = plane.at_zero + margin + plane.per_y * static_cast<float>(j) +
+                      plane.per_x * TriangleRaster::x_in_step(j);
+    // Without a branch: in lanes.
     for (int i = left; i < right; ++i) {
-      const float height = row + plane.per_y * TriangleRaster::y_in_step(i) +
-                           plane.per_x * (static_cast<float>(i) + x_in_step);
-      const bool above = !(nearness[i] <= height);
-      any_above = any_above || above;
-      all_above = all_above && nearness[i] > height;
+      const float height = row + plane.per_y * kYInStep[static_cast<std::size_t>(i)] +
+                           plane.per_x * static_cast<float>(i);
+      above += nearness[i] > height ? 1 : 0;
     }
-    if (any_above && !all_above) return Lit::kUnknown;
+    asked += columns;
+    if (above != 0 && above != asked) return Lit::kUnknown;
   }
-  if (!any_above) return Lit::kYes;
-  return all_above ? Lit::kNo : Lit::kUnknown;
+  return above == 0 ? Lit::kYes : Lit::kNo;
 }
 
 }  // namespace engine
