@@ -45,7 +45,6 @@ LatticeRenderer::LatticeRenderer(const RenderSpec& spec, std::shared_ptr<TracedT
     Bench& bench = *benches_.back();
     bench.seen.resize(points);
     bench.nearness.resize(points);
-    bench.tones.reserve(at(per_px * per_px));
     bench.tallies.resize(at(all.width()));
     bench.mirrors.reserve(points);
   }
@@ -160,92 +159,12 @@ void LatticeRenderer::shade_row(const Snapshot& snapshot, Radiance& out, int ind
   for (int column = 0; column < region.width(); ++column) {
     bench.tallies[at(column)] = {};
     if (view_.footprint().marked(region.left + column, region.top + index))
-      shade_pixel(row, column);
+      for (const Tone& tone : bench.tones.find(bench.seen, column)) shade(row, column, tone);
   }
   settle(row);
   tell_noise(row);
   row_counts_[at(index)] = bench.counts;
   bench.taken.store(false, std::memory_order_release);
-}
-
-bool LatticeRenderer::all_see(const Row& row, int column, std::uint32_t facet) const noexcept {
-  const int n = view_.points_a_pixel();
-  std::uint32_t differs = 0;
-  for (int y = 0; y < n; ++y) {
-    const std::uint32_t* seen = &row.bench.seen[at(y) * view_.stride() + at(column * n)];
-    for (int x = 0; x < n; ++x) differs |= seen[x] ^ facet;
-  }
-  return differs == 0;
-}
-
-void LatticeRenderer::shade_pixel(const Row& row, int column) noexcept {
-  const int n = view_.points_a_pixel();
-  std::vector<Tone>& tones = row.bench.tones;
-  tones.clear();
-  const std::uint32_t first = row.bench.seen[at(column * n)];
-  if (all_see(row, column, first)) {
-    if (first == TriangleRaster::kNone) return;
-    tones.push_back(whole_pixel(first));
-  } else {
-    collect(row, column);
-  }
-  for (const Tone& tone : tones) shade(row, column, tone);
-}
-
-/// The facets of a pixel, from runs of one facet in a row of points of a cell.
-void LatticeRenderer::collect(const Row& row, int column) const noexcept {
-  const int n = view_.points_a_pixel();
-  const int side = view_.side();
-  std::size_t last = 0;
-  for (int y = 0; y < n; ++y) {
-    const std::uint32_t* seen = &row.bench.seen[at(y) * view_.stride() + at(column * n)];
-    for (int cell_x = 0; cell_x < n; cell_x += side) {
-      int begin = cell_x;
-      for (int x = cell_x + 1; x <= cell_x + side; ++x) {
-        if (x < cell_x + side && seen[x] == seen[begin]) continue;
-        if (seen[begin] != TriangleRaster::kNone)
-          add_run(row, last, seen[begin], begin, y, x - begin);
-        begin = x;
-      }
-    }
-  }
-}
-
-void LatticeRenderer::add_run(const Row& row, std::size_t& last, std::uint32_t facet, int x, int y,
-                              int length) const noexcept {
-  std::vector<Tone>& tones = row.bench.tones;
-  if (last >= tones.size() || tones[last].facet != facet) {
-    for (last = 0; last < tones.size() && tones[last].facet != facet;) ++last;
-    if (last == tones.size()) {
-      tones.emplace_back();
-      tones.back().facet = facet;
-    }
-  }
-  Tone& tone = tones[last];
-  const auto points = static_cast<unsigned>(length);
-  const std::size_t cell = at(y / view_.side() * spec_.grid.oversampling + x / view_.side());
-  const auto add_to = [cell](auto& sums, unsigned more) {
-    sums[cell] = static_cast<std::uint16_t>(sums[cell] + more);
-  };
-  tone.points += points;
-  add_to(tone.in_cell, points);
-  add_to(tone.sum_x, points * (2U * static_cast<unsigned>(x) + points));
-  add_to(tone.sum_y, points * (2U * static_cast<unsigned>(y) + 1U));
-}
-
-/// A pixel that sees nothing else.
-LatticeRenderer::Tone LatticeRenderer::whole_pixel(std::uint32_t facet) const noexcept {
-  const auto s = static_cast<unsigned>(spec_.grid.oversampling);
-  const auto side = static_cast<unsigned>(view_.side());
-  Tone tone;
-  tone.facet = facet;
-  tone.points = s * s * side * side;
-  for (unsigned cell = 0; cell < s * s; ++cell) {
-    tone.in_cell[cell] = static_cast<std::uint16_t>(side * side);
-    tone.sum_x[cell] = static_cast<std::uint16_t>(side * side * side * (2U * (cell % s) + 1U));
-    tone.sum_y[cell] = static_cast<std::uint16_t>(side * side * side * (2U * (cell / s) + 1U));
-  }
-  return tone;
 }
 
 /// Light of `points` of a cell's.

@@ -10,6 +10,7 @@
 #include "engine/render/lattice_noise.h"
 #include "engine/render/lattice_view.h"
 #include "engine/render/path_tracer.h"
+#include "engine/render/pixel_tones.h"
 #include "engine/render/render_spec.h"
 #include "engine/render/shadow_doubts.h"
 #include "engine/render/texel_light.h"
@@ -41,16 +42,8 @@ class LatticeRenderer final : public Renderer {
   RenderReport render(const Snapshot& snapshot, Budget budget, Radiance& out) noexcept override;
 
  private:
-  static constexpr std::size_t kMostCells = 16;
-  /// A facet in a pixel.
-  struct Tone {
-    std::uint32_t facet = 0;
-    std::uint32_t points = 0;
-    std::array<std::uint16_t, kMostCells> in_cell{};  // points
-    // Of these, in half steps from the pixel's corner.
-    std::array<std::uint16_t, kMostCells> sum_x{};
-    std::array<std::uint16_t, kMostCells> sum_y{};
-  };
+  static constexpr std::size_t kMostCells = PixelTones::kMostCells;
+  using Tone = PixelTones::Tone;
   /// A pixel on a facet's plane: near enough a parallelogram.
   struct PixelOnFacet {
     Eigen::Vector3f corner;
@@ -78,10 +71,10 @@ class LatticeRenderer final : public Renderer {
   /// What a thread needs for a row of pixels.
   struct Bench {
     Bench(const LatticeView& view, const TracedTarget& target, std::size_t points)
-        : doubts(view, target, points) {}
+        : tones(view), doubts(view, target, points) {}
     std::vector<std::uint32_t> seen;  // by the row's points, as TriangleRaster gives them
     std::vector<float> nearness;
-    std::vector<Tone> tones;                   // of a pixel
+    PixelTones tones;
     std::vector<LatticeNoise::Tally> tallies;  // by pixel of the row
     ShadowDoubts doubts;
     std::vector<Mirror> mirrors;
@@ -102,12 +95,6 @@ class LatticeRenderer final : public Renderer {
   [[nodiscard]] Bench& take_bench() noexcept;
   void light_up(const Snapshot& snapshot) noexcept;
   void shade_row(const Snapshot& snapshot, Radiance& out, int index) noexcept;
-  [[nodiscard]] bool all_see(const Row& row, int column, std::uint32_t facet) const noexcept;
-  [[nodiscard]] Tone whole_pixel(std::uint32_t facet) const noexcept;
-  void collect(const Row& row, int column) const noexcept;
-  void add_run(const Row& row, std::size_t& last, std::uint32_t facet, int x, int y,
-               int length) const noexcept;
-  void shade_pixel(const Row& row, int column) noexcept;
   void shade(const Row& row, int column, const Tone& tone) noexcept;
   void add_kept(const Row& row, int column, const Tone& tone, const SurfacePoint& middle,
                 const PixelOnFacet& pixel, CellLight& light) noexcept;
