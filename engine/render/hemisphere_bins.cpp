@@ -13,7 +13,7 @@ using Eigen::Vector3f;
 
 // A lobe whose half vector stays within this is a mirror to the bins: they are twice as wide.
 constexpr double kNarrow_rad = 4.0 * kDegree;
-constexpr int kStepsInBin = 6;
+constexpr int kStepsInBin = 4;
 
 std::size_t at(int i) noexcept { return static_cast<std::size_t>(i); }
 

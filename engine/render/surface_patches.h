@@ -23,7 +23,7 @@ class SurfacePatches {
   static constexpr std::uint32_t kNone = 0xFFFFFFFFU;  ///< no patch: nothing is known, so dark
   static constexpr std::uint32_t kSky = 0xFFFFFFFEU;   ///< a ray that leaves the target
   static constexpr std::size_t kPoints = 8;            ///< of a patch, that stand for it
-  static constexpr std::size_t kRaysABin = 8;
+  static constexpr std::size_t kRaysABin = 2;
   static constexpr std::size_t kRays = HemisphereBins::kBins * kRaysABin;
 
   struct Patch {
