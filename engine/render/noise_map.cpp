@@ -111,6 +111,7 @@ NoiseReached NoiseMap::measure(const PixelRect& region, std::span<const float> m
     const auto rho2 = static_cast<double>(work_[i] * weight_[i]);
     sum += rho2;
     worst = std::max(worst, rho2);
+    reached.firefly_px += rho2 >= NoiseReached::kFirefly * NoiseReached::kFirefly ? 1 : 0;
   }
   reached.rms = reached.lit_px > 0 ? std::sqrt(sum / reached.lit_px) : 0.0;
   reached.worst = std::sqrt(worst);

@@ -81,6 +81,8 @@ struct NoiseReached {
   double worst = std::numeric_limits<double>::quiet_NaN();
   int lit_px = 0;
   int clipped_px = 0;
+  static constexpr double kFirefly = 5;
+  int firefly_px = 0;  ///< lit, and their own error is kFirefly sigmas or more: few samples made it
 };
 
 struct RaysByKind {

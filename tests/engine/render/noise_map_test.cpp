@@ -45,6 +45,16 @@ TEST(NoiseMap, WithoutSpreadNoiseIsThePixelsOwn) {
   EXPECT_NEAR(reached.rms, 50.0 / std::sqrt(409.0) / kSide, 1e-6);
 }
 
+TEST(NoiseMap, CountsPixelsWhoseErrorStandsOut) {
+  SensorNoise sharp = kSensor;
+  sharp.blur_px = 0;
+  NoiseMap map(kRegion, sharp);
+  std::vector<float> variance = map_of(0.01F);
+  variance[at(5, 5)] = 1.05F;  // 102.5 e-: five times the root of 409 is 101.1
+  variance[at(9, 5)] = 0.97F;  // 98.5 e-
+  EXPECT_EQ(map.measure(kRegion, map_of(4.0F), variance).firefly_px, 1);
+}
+
 TEST(NoiseMap, OneNoisyPixelIsSpreadOverItsNeighbours) {
   NoiseMap map(kRegion, kSensor);
   std::vector<float> variance = map_of(0.0F);
