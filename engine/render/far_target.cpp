@@ -19,6 +19,7 @@ constexpr double kPeak = 0.41;
 constexpr double kSecond = 1.20;
 constexpr double kThird = 3.55;
 constexpr double kFourth = 16.6;
+constexpr double kDenser = 2.0;  // than a blot with the same second moments
 constexpr double kPaperBlur_px = 0.675;
 
 // A fifth of the variance of all model errors is the form's; the light's change may be as much.
@@ -94,7 +95,7 @@ RenderReport FarTarget::render(const Snapshot& snapshot, Budget budget, Radiance
   report.rho_mc = {};
   report.visible_fraction = share_in_frame(view, out);
   constexpr double kNotKnown = std::numeric_limits<double>::quiet_NaN();
-  const bool known = spec_.noise.e_per_radiance > 0.0 && form != Form::kImage;
+  const bool known = spec_.noise.e_per_radiance > 0.0;
   report.add({"target",
               form == Form::kPoint   ? "point"
               : form == Form::kImage ? "image"
@@ -163,6 +164,7 @@ double FarTarget::unseen_share(const View& view) const noexcept {
 
 /// Of the light, at most, in one pixel.
 double FarTarget::error_share(Form form, const View& view) const noexcept {
+  if (form == Form::kImage) return image_error_share(view);
   const double px2 = view.px2_per_m2() / (width_ * width_);
   const double peak = 1.0 / (width_ * width_);
   const LightParts& parts = light_.parts();
@@ -171,6 +173,20 @@ double FarTarget::error_share(Form form, const View& view) const noexcept {
       parts.mismatch(static_cast<int>(form) - static_cast<int>(Form::kMoments));
   return peak * (kThird / 6.0 * px2 * std::sqrt(px2) * off.third +
                  kFourth / 24.0 * px2 * px2 * off.fourth);
+}
+
+/// Each cell's light is spread over it and over those of the grid that it touches: half the second
+/// derivative times the variances that this adds, where light is densest, taken as twice what it
+/// would be in a blot; and three sigmas of the noise that the picture has there.
+double FarTarget::image_error_share(const View& view) const noexcept {
+  const double cell_m = light_.cell_m();
+  const double cell_u = cell_m * (std::abs(view.per_x.u) + std::abs(view.per_y.u));
+  const double cell_v = cell_m * (std::abs(view.per_x.v) + std::abs(view.per_y.v));
+  const double grid_px = 1.0 / spec_.grid.oversampling;
+  const double added_px2 = (cell_u * cell_u + cell_v * cell_v + 2.0 * grid_px * grid_px) / 12.0;
+  const double peak = peak_share(view);
+  return kDenser * peak / kPeak * 0.5 * kSecond * added_px2 / (width_ * width_) +
+         3.0 * std::sqrt(peak) * light_.noise_share();
 }
 
 /// The coarsest that the sensor cannot tell, or the last one.

@@ -18,7 +18,8 @@ namespace engine {
 ///            second moments,
 ///   moments  4 to 64 points with all moments up to the second (LightParts),
 ///   image    FarLight's picture, each of its cells spread over the grid by area: as good as the
-///            resolving renderer's grid, and with less noise;
+///            resolving renderer's grid, and with less noise; its error is told once a picture has
+///            been whole;
 /// and from kLargest_px on, or nearer than kNearest_radii where lines of sight are no longer
 /// parallel, by the other renderer. Derivatives are those of the spread of light of the paper's
 /// camera, scaled to this one's width. Once a finer form has been taken a coarser one is not until
@@ -61,6 +62,7 @@ class FarTarget final : public Renderer {
   /// Of the light: what the brightest pixel may be off by without the sensor telling.
   [[nodiscard]] double unseen_share(const View& view) const noexcept;
   [[nodiscard]] double error_share(Form form, const View& view) const noexcept;
+  [[nodiscard]] double image_error_share(const View& view) const noexcept;
   [[nodiscard]] Form choose_form(const Snapshot& snapshot, const View& view) noexcept;
   void draw_points(Form form, const View& view, Radiance& out) const noexcept;
   void draw_cells(bool with_light, const View& view, Radiance& out) const noexcept;

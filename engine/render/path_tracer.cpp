@@ -238,7 +238,11 @@ void PathTracer::run_passes(const Snapshot& snapshot, const Budget& budget, Dura
       *std::max_element(wanted_.begin(), wanted_.begin() + static_cast<std::ptrdiff_t>(pixels));
   const bool by_clock = reads_clock(budget);
   const bool in_passes = budget.passes > 0 || by_clock;
-  Pass pass{0, in_passes ? std::min(1U, most) : most};
+  const std::uint32_t done =
+      budget.samples_done > 0
+          ? std::min(each_of(budget.samples_done, spec_.grid.oversampling, replicates_used_), most)
+          : 0U;
+  Pass pass{done, in_passes ? std::min(std::max(1U, done), most) : most};
   for (;;) {
     const Duration before = by_clock ? spec_.clock() : Duration{};
     pool_.rows(0, out.region.height(), [&](int row) { trace_row(snapshot, pass, out, row); });

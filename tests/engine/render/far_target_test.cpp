@@ -43,6 +43,7 @@ struct Rig {
     int threads = 1;
     FarTargetForm form = FarTargetForm::kAuto;
     int bounces = 0;
+    bool settled = false;  ///< a picture is whole in its first frame
   };
   Rig(const Mesh& mesh, const std::vector<Material>& materials, const Choice& choice)
       : pool(choice.threads), optics(optics_spec(choice), 1e-3 / to_e(), pool) {
@@ -50,6 +51,7 @@ struct Rig {
     spec.samples_per_pixel = choice.samples;
     spec.bounces = choice.bounces;
     spec.far_target = choice.form;
+    spec.settled = choice.settled;
     spec.camera = small_camera(choice.side_px);
     spec.grid = optics.wish();
     spec.noise = {optics.throughput_sr() * to_e(), 22.0, 30000.0, optics.noise_blur_px()};
@@ -237,7 +239,7 @@ TEST(FarTarget, EachFormIsTakenOnceAnApproachWhateverTheLightDoes) {
 TEST(FarTarget, SubPixelPhaseChangesNeitherFluxNorCentroid) {
   for (const double range_m : {3e7, 6e6}) {  // a point and moments
     // All the window that light is spread over lies in the frame.
-    Rig rig(telescope_mesh(), white_telescope(), {RenderMethod::kPaths, 160});
+    Rig rig(telescope_mesh(), white_telescope(), {.side_px = 160, .settled = true});
     Truth truth(telescope_mesh(), white_telescope(), rig);
     double least = 1e300;
     double most = 0;
@@ -264,11 +266,12 @@ TEST(FarTarget, WhatAFormSaysBoundsItsErrorInEveryPixel) {
   add_plate(mesh, "black", {-4, -0.1F, 0}, {7, 0, 0}, {0, 0.2F, 0});
   const std::vector<Material> materials = {lambert_material("white", 0.8),
                                            lambert_material("black", 0.0)};
-  for (const double range_m : {2e7, 1.2e7, 8e6, 6e6, 4e6}) {
-    Rig rig(mesh, materials, {});
+  for (const double range_m : {2e7, 1.2e7, 8e6, 6e6, 4e6, 2e6, 1e6, 4e5}) {
+    Rig rig(mesh, materials, {.settled = true});
     Truth truth(mesh, materials, rig);
     const Snapshot snapshot = from_afar(range_m, {0.2, 0.1, 1.0});
-    const double bound_e = error_of(rig.render(snapshot));
+    const RenderReport report = rig.render(snapshot);
+    const double bound_e = error_of(report);
     ASSERT_GT(bound_e, 0.0);
     (void)rig.project();
     const IrradianceImage drawn = rig.image;
@@ -284,12 +287,14 @@ TEST(FarTarget, WhatAFormSaysBoundsItsErrorInEveryPixel) {
     // Rounding of the transform besides.
     EXPECT_LE(worst_e, bound_e + 1e-5 * rig.light_e()) << range_m;
     // Its share of all errors that the profile allows.
-    EXPECT_LE(sigmas, 0.3 * 0.45) << range_m;
+    if (form_of(report) != "image") {
+      EXPECT_LE(sigmas, 0.3 * 0.45) << range_m;
+    }
   }
 }
 
 TEST(FarTarget, AtTheFramesEdgeThePartWithinIsTold) {
-  Rig rig(telescope_mesh(), white_telescope(), {});
+  Rig rig(telescope_mesh(), white_telescope(), {.settled = true});
   const double range_m = 2e6;  // 7 px across
   const auto at_column = [&](double u) { return off_axis(range_m, 32.0 - u, 0.0); };
   EXPECT_NEAR(rig.render(at_column(32.0)).visible_fraction, 1.0, 1e-6);  // sums in single precision
@@ -434,7 +439,7 @@ TEST(FarTarget, SameBitsOnAnyNumberOfThreadsAndAgain) {
 
 TEST(FarTarget, AKeptPictureCostsNoRays) {
   Rig rig(telescope_mesh(), white_telescope(), {});
-  EXPECT_GT(rig.render(from_afar(5e6)).rays, 0U);
+  for (int i = 0; i < FarLight::kBatches; ++i) EXPECT_GT(rig.render(from_afar(5e6)).rays, 0U);
   const RenderReport again = rig.render(from_afar(4.9e6));
   EXPECT_EQ(again.rays, 0U);
   EXPECT_EQ(again.samples, 0U);
