@@ -10,9 +10,11 @@
 Tycho-2 (Hog et al. 2000, A&A 355, L27) as astrometry.net's index has it: mean places at J2000 and VT,
 BSD-2-Clause; of each 0.14 square degrees the ten brightest. It has no colours, no motions and not the
 brightest stars. XHIP (Anderson & Francis 2012, Astron. Lett. 38, 331) as d3-celestial has it,
-BSD-3-Clause: V, B-V and places at J2000, rounded to 1e-4 degrees, of the 118 216 stars of Hipparcos;
-no motions. Where both have a star, the place is Tycho-2's and the light XHIP's. The motions of the
-brightest and of the fastest stars are copied from Hipparcos (ESA 1997, SP-1200), MOTIONS below.
+BSD-3-Clause: V, B-V and places at J2000, rounded to 1e-4 degrees, of the 118 216 stars of Hipparcos.
+d3-celestial has left XHIP's motions out: its version 0.7.35 gives a star an id, `mag`, `bv` and
+coordinates, and nothing else. Where both have a star, the place is Tycho-2's and the light XHIP's. The
+motions of the brightest and of the fastest stars are copied from Hipparcos (ESA 1997, SP-1200), MOTIONS
+below.
 
 The format is described in engine/scene/star_catalogue.h. Needs numpy. Prints what it did."""
 

@@ -341,4 +341,32 @@ TEST(StarloopRender, SeedChangesTheNoiseAndNothingMore) {
   EXPECT_FALSE(frames[0] == frames[1]);
 }
 
+TEST(StarloopRender, SeveralTimesGiveFramesAsEachAloneAndASheet) {
+  const TemporaryFolder folder;
+  const auto render = [&](const std::string& times, const std::string& name) {
+    const Outcome run =
+        starloop({"render", "--set", "render.samples_per_pixel=4", "--quiet", "--tile", "100",
+                  "--out", (folder.path() / name).string(), "--time", times, kFlyby});
+    EXPECT_EQ(run.exit_code, kGood) << run.err;
+  };
+  render("309779.63,309782.63", "pass.fits");
+  render("309782.63", "second.fits");
+  EXPECT_TRUE(content_of(folder.path() / "pass_2.fits") ==
+              content_of(folder.path() / "second.fits"));
+  EXPECT_FALSE(content_of(folder.path() / "pass_1.fits") ==
+               content_of(folder.path() / "pass_2.fits"));
+  EXPECT_TRUE(fs::exists(folder.path() / "pass_1.png"));
+  // PNG has the width and the height as its first numbers: two squares of 100 px in a row.
+  const std::string sheet = content_of(folder.path() / "pass.png");
+  ASSERT_GT(sheet.size(), 24U);
+  const auto number = [&](std::size_t at) {
+    return static_cast<unsigned char>(sheet[at + 2]) * 256 +
+           static_cast<unsigned char>(sheet[at + 3]);
+  };
+  EXPECT_EQ(number(16), 2 * 100 + 3 * 4);
+  EXPECT_GT(number(20), 100);
+  EXPECT_LT(number(20), 150);
+  EXPECT_FALSE(fs::exists(folder.path() / "pass.fits"));
+}
+
 }  // namespace

@@ -82,12 +82,23 @@ int run_command(int argc, char** argv) {
   passes_app->add_flag("--json", json, "print an array of objects");
 
   starloop::RenderOptions render;
-  CLI::App* render_app = app.add_subcommand("render", "Write one frame as FITS and PNG");
+  CLI::App* render_app = app.add_subcommand("render", "Write frames as FITS and PNG");
   add_common(*render_app, common);
-  render_app->add_option("--time", render.time_s, "shutter opens, seconds after the epoch")
+  render_app
+      ->add_option("--time", render.times_s,
+                   "shutter opens, seconds after the epoch; several, with commas: a numbered frame "
+                   "of each, and a contact sheet of all")
       ->required()
+      ->delimiter(',')
+      ->expected(1, 64)
+      ->allow_extra_args(false)  // the scenario may follow
       ->check(CLI::Range(0.0, 9e9));
   render_app->add_option("--out", render.out, "FITS file; the PNG goes beside it")
+      ->capture_default_str();
+  render_app
+      ->add_option("--tile", render.tile_px,
+                   "pixels on a side of what the contact sheet shows about the target's centre")
+      ->check(CLI::Range(16, 1024))
       ->capture_default_str();
 
   starloop::SoakOptions soak;
@@ -122,7 +133,7 @@ int run_command(int argc, char** argv) {
   if (replay_app->parsed()) return starloop::replay_log(replay);
   if (links_app->parsed()) return starloop::list_links();
   if (passes_app->parsed()) return starloop::list_passes(common, json);
-  return starloop::render_frame(common, render);
+  return starloop::render_frames(common, render);
 }
 
 }  // namespace

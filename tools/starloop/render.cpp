@@ -6,6 +6,7 @@
 #include "engine/core/constants.h"
 #include "engine/core/fits.h"
 #include "engine/orbit/utc.h"
+#include "tools/starloop/frame_sheet.h"
 #include "tools/starloop/picture.h"
 #include "tools/starloop/subcommands.h"
 
@@ -19,9 +20,9 @@ std::string left_out(const engine::Rung& rung) {
   return text;
 }
 
-std::vector<engine::FitsCard> header_of(const Scenario& s, const RenderOptions& options,
+std::vector<engine::FitsCard> header_of(const Scenario& s, double time_s,
                                         const engine::FrameReport& r) {
-  const engine::Epoch open = s.scene.epoch + engine::from_seconds(options.time_s);
+  const engine::Epoch open = s.scene.epoch + engine::from_seconds(time_s);
   const engine::FrameTruth& t = r.truth;
   const engine::NoiseReached& noise = r.render.rho_mc;
   return {
@@ -29,7 +30,7 @@ std::vector<engine::FitsCard> header_of(const Scenario& s, const RenderOptions& 
       {"OBJECT", s.mesh, "target"},
       {"SCENARIO", s.name, "scenario"},
       {"DATE-OBS", engine::utc_text(open), "shutter opens, UTC"},
-      {"TIME", options.time_s, "[s] shutter opens, after the scenario's epoch"},
+      {"TIME", time_s, "[s] shutter opens, after the scenario's epoch"},
       {"EXPTIME", engine::seconds(s.run.exposure), "[s] exposure"},
       {"SEED", static_cast<long long>(s.scene.seed), "of all random numbers"},
       {"BUNIT", "DN", "digital numbers"},
@@ -56,60 +57,90 @@ std::vector<engine::FitsCard> header_of(const Scenario& s, const RenderOptions& 
   };
 }
 
+/// What a person wants to know of it.
+void tell(const std::string& fits, const std::string& png, const Scenario& scenario,
+          const std::string& star_text, const engine::FrameReport& report) {
+  const engine::FrameTruth& t = report.truth;
+  std::printf("%s, %s: range %.3f km, phase %.1f deg, peak %.0f e- = %d DN%s\n", fits.c_str(),
+              png.c_str(), t.range_m * 1e-3, t.phase_angle_rad / engine::kDegree, t.peak_e,
+              report.peak_dn, t.sun_irradiance_w_m2 > 0.0 ? "" : ", in the Earth's shadow");
+  for (std::size_t i = 0; i < t.companions; ++i) {
+    const engine::CompanionTruth& c = t.companion[i];
+    std::printf("%s: range %.3f km, centre at (%.2f, %.2f), %.0f %% in the frame%s\n",
+                scenario.companions[i].name.c_str(), c.range_m * 1e-3, c.target_px.u, c.target_px.v,
+                100.0 * c.visible_fraction,
+                c.sun_irradiance_w_m2 > 0.0 ? "" : ", in the Earth's shadow");
+  }
+  const engine::NoiseReached& noise = report.render.rho_mc;
+  if (std::isfinite(noise.rms))
+    std::printf("rendering noise %.3f of the sensor's over %d lit pixels, at worst %.2f\n",
+                noise.rms, noise.lit_px, noise.worst);
+  if (scenario.run.render_time > engine::Duration{})
+    std::printf("render.deadline_ms is for runs: this picture took the time it needed\n");
+  for (const engine::Rung& rung : report.render.rungs)
+    if (!rung.ladder.empty())
+      std::printf("%s: %s%s\n", std::string(rung.ladder).c_str(), std::string(rung.taken).c_str(),
+                  left_out(rung).c_str());
+  if (!star_text.empty()) {
+    const engine::StarReport& stars = report.stars;
+    std::printf(
+        "%s\n%d in the frame, the brightest V %.2f at (%.2f, %.2f), %.0f e-; %d behind the "
+        "Earth; %d too faint, together %.0f e-, at most %.2f e- in a pixel\n",
+        star_text.c_str(), stars.in_frame, stars.brightest_v, stars.brightest_px.u,
+        stars.brightest_px.v, stars.brightest_e, stars.behind_earth, stars.faint, stars.left_out_e,
+        stars.left_out_peak_e);
+  }
+}
+
+/// "frame.fits" -> "frame_3.fits".
+std::filesystem::path numbered(const std::filesystem::path& path, std::size_t number) {
+  std::filesystem::path out = path;
+  out.replace_filename(path.stem().string() + "_" + std::to_string(number) +
+                       path.extension().string());
+  return out;
+}
+
+std::string label_of(double time_s, const engine::FrameTruth& truth) {
+  char text[80];
+  std::snprintf(text, sizeof text, "%.2f s, %.1f km, %.0f deg", time_s, truth.range_m * 1e-3,
+                truth.phase_angle_rad / engine::kDegree);
+  return text;
+}
+
 }  // namespace
 
-int render_frame(const CommonOptions& options, const RenderOptions& render) {
+int render_frames(const CommonOptions& options, const RenderOptions& render) {
   Scenario scenario = load_scenario(options);
-  // What a run gathers over its frames this one has from the beginning.
+  // What a run gathers over its frames these have from the beginning.
   scenario.render.settled = true;
-  Rig rig(scenario, options.threads);
-  hil::ScriptedPointing pointing = rig.prediction();
-  engine::Shot shot;
-  shot.shutter_open = engine::sim_time(render.time_s);
-  shot.exposure = scenario.run.exposure;
-  shot.attitude = {pointing.attitude(shot.shutter_open),
-                   pointing.attitude(shot.shutter_open + shot.exposure / 2),
-                   pointing.attitude(shot.shutter_open + shot.exposure)};
-  engine::TruthMask mask;
-  engine::DnImage frame(scenario.scene.camera.width_px, scenario.scene.camera.height_px);
-  const engine::FrameReport report = rig.generator().expose(shot, engine::Budget{}, frame, mask);
+  const std::filesystem::path out(render.out);
+  const std::string sheet_png = std::filesystem::path(out).replace_extension(".png").string();
+  const bool several = render.times_s.size() > 1;
+  FrameSheet sheet(render.tile_px);
+  for (std::size_t i = 0; i < render.times_s.size(); ++i) {
+    const double time_s = render.times_s[i];
+    Rig rig(scenario, options.threads);
+    hil::ScriptedPointing pointing = rig.prediction();
+    engine::Shot shot;
+    shot.shutter_open = engine::sim_time(time_s);
+    shot.exposure = scenario.run.exposure;
+    shot.attitude = {pointing.attitude(shot.shutter_open),
+                     pointing.attitude(shot.shutter_open + shot.exposure / 2),
+                     pointing.attitude(shot.shutter_open + shot.exposure)};
+    engine::TruthMask mask;
+    engine::DnImage frame(scenario.scene.camera.width_px, scenario.scene.camera.height_px);
+    const engine::FrameReport report = rig.generator().expose(shot, engine::Budget{}, frame, mask);
 
-  const std::filesystem::path fits(render.out);
-  const std::string png = std::filesystem::path(fits).replace_extension(".png").string();
-  engine::write_fits(fits.string(), frame, header_of(scenario, render, report));
-  write_png(png, frame, scenario.detector.bits);
-  if (!options.quiet) {
-    const engine::FrameTruth& t = report.truth;
-    std::printf("%s, %s: range %.3f km, phase %.1f deg, peak %.0f e- = %d DN%s\n",
-                fits.string().c_str(), png.c_str(), t.range_m * 1e-3,
-                t.phase_angle_rad / engine::kDegree, t.peak_e, report.peak_dn,
-                t.sun_irradiance_w_m2 > 0.0 ? "" : ", in the Earth's shadow");
-    for (std::size_t i = 0; i < t.companions; ++i) {
-      const engine::CompanionTruth& c = t.companion[i];
-      std::printf("%s: range %.3f km, centre at (%.2f, %.2f), %.0f %% in the frame%s\n",
-                  scenario.companions[i].name.c_str(), c.range_m * 1e-3, c.target_px.u,
-                  c.target_px.v, 100.0 * c.visible_fraction,
-                  c.sun_irradiance_w_m2 > 0.0 ? "" : ", in the Earth's shadow");
-    }
-    const engine::NoiseReached& noise = report.render.rho_mc;
-    if (std::isfinite(noise.rms))
-      std::printf("rendering noise %.3f of the sensor's over %d lit pixels, at worst %.2f\n",
-                  noise.rms, noise.lit_px, noise.worst);
-    if (scenario.run.render_time > engine::Duration{})
-      std::printf("render.deadline_ms is for runs: this picture took the time it needed\n");
-    for (const engine::Rung& rung : report.render.rungs)
-      if (!rung.ladder.empty())
-        std::printf("%s: %s%s\n", std::string(rung.ladder).c_str(), std::string(rung.taken).c_str(),
-                    left_out(rung).c_str());
-    if (!rig.star_text().empty()) {
-      const engine::StarReport& stars = report.stars;
-      std::printf(
-          "%s\n%d in the frame, the brightest V %.2f at (%.2f, %.2f), %.0f e-; %d behind the "
-          "Earth; %d too faint, together %.0f e-, at most %.2f e- in a pixel\n",
-          rig.star_text().c_str(), stars.in_frame, stars.brightest_v, stars.brightest_px.u,
-          stars.brightest_px.v, stars.brightest_e, stars.behind_earth, stars.faint,
-          stars.left_out_e, stars.left_out_peak_e);
-    }
+    const std::filesystem::path fits = several ? numbered(out, i + 1) : out;
+    const std::string png = std::filesystem::path(fits).replace_extension(".png").string();
+    engine::write_fits(fits.string(), frame, header_of(scenario, time_s, report));
+    write_png(png, frame, scenario.detector.bits);
+    sheet.add(frame, report.truth.target_px, label_of(time_s, report.truth));
+    if (!options.quiet) tell(fits.string(), png, scenario, rig.star_text(), report);
+  }
+  if (several) {
+    sheet.write(sheet_png);
+    if (!options.quiet) std::printf("%s: all of them\n", sheet_png.c_str());
   }
   return kGood;
 }

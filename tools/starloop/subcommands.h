@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "tools/starloop/scenario.h"
 
@@ -16,11 +17,13 @@ int list_passes(const CommonOptions& options, bool as_json);
 int list_links();
 
 struct RenderOptions {
-  double time_s = 0;
+  std::vector<double> times_s;
   std::string out = "frame.fits";
+  int tile_px = 256;
 };
-/// Writes one frame as FITS and PNG, the camera looking at the target.
-int render_frame(const CommonOptions& options, const RenderOptions& render);
+/// Writes one frame for each time as FITS and PNG, the camera looking at the target; of several,
+/// a picture of all of them besides.
+int render_frames(const CommonOptions& options, const RenderOptions& render);
 
 struct RunOptions {
   bool open_loop = false;
