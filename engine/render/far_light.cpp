@@ -154,7 +154,8 @@ void FarLight::update(const Snapshot& snapshot, double change) noexcept {
   report_.samples = report_.hits = report_.rays = report_.rejected_rays = 0;
   report_.rays_by_kind = {};
   if (!before.any || beyond(before, seen, change, 1.0)) {
-    if (making_ == shown_ || beyond(pictures_[making_].kept, seen, change, 1.0))
+    if (making_ == shown_ || !facets_are_ours_ ||
+        beyond(pictures_[making_].kept, seen, change, 1.0))
       begin(snapshot, seen);
     shown_ = making_;
     ++pictures_shown_;
@@ -162,6 +163,7 @@ void FarLight::update(const Snapshot& snapshot, double change) noexcept {
     show();
     learn_change(before, intensity_before);
   } else if (pictures_[making_].batches < kBatches) {
+    if (!facets_are_ours_) begin(snapshot, seen);
     add_batch();
     if (making_ == shown_) {
       show();
@@ -191,6 +193,7 @@ void FarLight::begin(const Snapshot& snapshot, const Kept& seen) noexcept {
   far.body_from_camera.matrix.col(1) = seen.y_axis;
   far.body_from_camera.matrix.col(2) = -seen.toward_camera;
   far.background_w_m2_sr = 0;
+  facets_are_ours_ = true;  // from its first batch on
   sum_ = sum2_ = last_mean_ = 0;
 }
 

@@ -43,6 +43,9 @@ class FarLight {
   /// For the snapshot's lamps and line of sight. `change`: of the light, as a share of it.
   void update(const Snapshot& snapshot, double change) noexcept;
 
+  /// Another renderer has lit the target's facets: a picture that is not whole is begun anew.
+  void interrupt() noexcept { facets_are_ours_ = false; }
+
   [[nodiscard]] double intensity_w_sr() const noexcept { return parts_.light(); }
   [[nodiscard]] double area_m2() const noexcept { return area_m2_; }
   /// In metres and W/sr.
@@ -109,6 +112,7 @@ class FarLight {
   std::array<Picture, 2> pictures_;
   std::size_t shown_ = 0;
   std::size_t making_ = 0;  ///< has the path tracer's own part of a picture
+  bool facets_are_ours_ = false;
   int pictures_shown_ = 0;
   // Of the batches of the picture in the making, their light.
   double sum_ = 0;

@@ -63,6 +63,7 @@ FarTarget::FarTarget(const RenderSpec& spec, std::unique_ptr<Renderer> resolved,
 
 RenderReport FarTarget::render(const Snapshot& snapshot, Budget budget, Radiance& out) noexcept {
   if (!far_enough(snapshot)) {
+    light_.interrupt();
     RenderReport report = resolved_->render(snapshot, budget, out);
     report.add({"target", "resolved", 0.0});
     return report;

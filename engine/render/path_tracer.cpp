@@ -75,7 +75,8 @@ PathTracer::PathTracer(const RenderSpec& spec, std::shared_ptr<TracedTarget> tar
 RenderReport PathTracer::render(const Snapshot& snapshot, Budget budget, Radiance& out) noexcept {
   const Duration start = reads_clock(budget) ? spec_.clock() : Duration{};
   RenderReport report;
-  find_bodies(snapshot, report);
+  const bool goes_on = budget.samples_done > 0;
+  if (!goes_on) find_bodies(snapshot, report);
   out.region = footprint_.region();
   out.uniform_w_m2_sr = snapshot.background_w_m2_sr;
   out.motion_px = snapshot.smear_px;
@@ -85,7 +86,7 @@ RenderReport PathTracer::render(const Snapshot& snapshot, Budget budget, Radianc
   report.bounces = bounced_[0].bounces();
   report.add(bounces_rung(report.bounces, spec_.bounces_left_out_e));
   if (out.region.empty()) return report;
-  light_up(snapshot, report);
+  if (!goes_on) light_up(snapshot, report);
   // Samples know the cap; what harmonics leave out they find.
   const bool cap = frames_[0].lamps.earth != nullptr;
   report.add({"earthshine", name_of(cap ? EarthshineModel::kCap : snapshot.earthshine_rung.model),

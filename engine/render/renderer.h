@@ -65,8 +65,8 @@ struct Budget {
   double rho_mc = 0;          ///< the largest Monte Carlo error after the optics, in sigmas, rms
   Duration time{};            ///< passes go on while the next one is likely to fit
   int passes = 0;             ///< so many, whatever the time: what a replay obeys
-  /// PathTracer: of samples_per_pixel, what the image has already from the call before, for the
-  /// same snapshot. The rest goes on where those ended.
+  /// PathTracer: of samples_per_pixel, what the image has already from the call before, with the
+  /// same snapshot at the same place. The rest goes on where those ended.
   int samples_done = 0;
 };
 

@@ -167,9 +167,9 @@ TEST(FarLight, WhatIsKeptOfAGlintIsWithinTheChangeAllowed) {
   EXPECT_LT(renewals, kSteps * 2 / 3);
 }
 
-TEST(FarLight, AWholePicturesLightIsGoodTo1In1000AtTheDefaultSamples) {
-  // Two bounces and two lamps, a telescope of narrow lobes: 24 seeds know an rms to 15 %, so that
-  // one of .09 % shows as less than .14 % but for one case in a thousand.
+TEST(PathTracerNoiseFar, AWholePicturesLightIsGoodTo1In1000AtTheDefaultSamples) {
+  // Two bounces and two lamps, a telescope of narrow lobes: 16 seeds know an rms to 18 %, so that
+  // one of .09 % shows as less than .14 % but for a case in a thousand.
   const auto target =
       std::make_shared<TracedTarget>(telescope_mesh(), test_support::telescope_materials());
   WorkerPool pool(2);
@@ -180,7 +180,7 @@ TEST(FarLight, AWholePicturesLightIsGoodTo1In1000AtTheDefaultSamples) {
   test_support::Moments first;
   test_support::Moments whole;
   double said2 = 0;
-  constexpr int kSeeds = 24;
+  constexpr int kSeeds = 16;
   for (snapshot.seed = 1; snapshot.seed <= kSeeds; ++snapshot.seed) {
     FarLight light(spec, target, pool);
     std::uint64_t most_rays = 0;
@@ -204,9 +204,9 @@ TEST(FarLight, AWholePicturesLightIsGoodTo1In1000AtTheDefaultSamples) {
   const double rms = std::sqrt(whole.variance()) / whole.mean();
   EXPECT_LT(rms, 1.4e-3);
   // Batches that go on with one sequence are better than ones by themselves.
-  EXPECT_LT(rms, 0.45 * std::sqrt(first.variance()) / first.mean());
-  // What the batches' differences say is no less, by the same 15 %, and not twice as much.
-  EXPECT_LT(rms, 1.45 * std::sqrt(said2));
+  EXPECT_LT(rms, 0.5 * std::sqrt(first.variance()) / first.mean());
+  // What the batches' differences say is no less, by the same 18 %, and not twice as much.
+  EXPECT_LT(rms, 1.55 * std::sqrt(said2));
   EXPECT_GT(rms, 0.4 * std::sqrt(said2));
 }
 

@@ -437,6 +437,20 @@ TEST(FarTarget, SameBitsOnAnyNumberOfThreadsAndAgain) {
   EXPECT_EQ(one, run(3));
 }
 
+TEST(FarTarget, AFrameThatIsResolvedDoesNotSpoilAPictureInTheMaking) {
+  const auto light_after = [](bool interrupted) {
+    Rig rig(telescope_mesh(), white_telescope(), {});
+    for (int i = 0; i < 3; ++i) (void)rig.render(from_afar(5e6));
+    if (interrupted) {
+      EXPECT_EQ(form_of(rig.render(from_afar(1e5, {-0.9, 0.5, 0.1}))), "resolved");
+    }
+    for (int i = 0; i < FarLight::kBatches; ++i) (void)rig.render(from_afar(5e6));
+    EXPECT_EQ(rig.render(from_afar(5e6)).rays, 0U);
+    return rig.light_e();
+  };
+  EXPECT_EQ(light_after(true), light_after(false));
+}
+
 TEST(FarTarget, AKeptPictureCostsNoRays) {
   Rig rig(telescope_mesh(), white_telescope(), {});
   for (int i = 0; i < FarLight::kBatches; ++i) EXPECT_GT(rig.render(from_afar(5e6)).rays, 0U);
