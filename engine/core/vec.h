@@ -10,6 +10,7 @@ struct J2000 {};         ///< Earth's centre, mean equator and equinox of J2000 
 struct OrbitalFrame {};  ///< x along track, y minus the orbit normal, z nadir
 struct BodyFrame {};     ///< the target's own: +x to the aperture, +z nadir, panels along y
 struct CameraFrame {};   ///< x right (u grows), y down (v grows), z boresight
+struct EarthFixed {};    ///< Earth's centre, x to Greenwich's meridian, z to the north pole
 
 /// Where something is, in metres.
 template <class Frame>

@@ -37,16 +37,20 @@ std::optional<Epoch> epoch_from_utc(const std::string& text) noexcept {
                Duration(std::llround(tai2 * kNanosecondsPerDay)));
 }
 
+TwoPartDate utc_date(Epoch t) noexcept {
+  const double ns = static_cast<double>(t.time_since_epoch().count());
+  TwoPartDate utc;
+  eraTaiutc(kJ2000Date, ns / kNanosecondsPerDay, &utc.day1, &utc.day2);
+  return utc;
+}
+
 std::string utc_text(Epoch t) {
-  const std::int64_t ns = t.time_since_epoch().count();
-  double utc1 = 0;
-  double utc2 = 0;
-  eraTaiutc(kJ2000Date, static_cast<double>(ns) / kNanosecondsPerDay, &utc1, &utc2);
+  const TwoPartDate utc = utc_date(t);
   int year = 0;
   int month = 0;
   int day = 0;
   int clock[4] = {};
-  eraD2dtf("UTC", 3, utc1, utc2, &year, &month, &day, clock);
+  eraD2dtf("UTC", 3, utc.day1, utc.day2, &year, &month, &day, clock);
   char text[40];
   std::snprintf(text, sizeof text, "%04d-%02d-%02dT%02d:%02d:%02d.%03d", year, month, day, clock[0],
                 clock[1], clock[2], clock[3]);

@@ -14,11 +14,12 @@ namespace engine {
 /// To the nearest millisecond: "2022-01-04T14:02:41.630".
 [[nodiscard]] std::string utc_text(Epoch t);
 
-/// Terrestrial Time as a Julian date in two parts, as ERFA takes it.
+/// A Julian date in two parts, as ERFA takes it.
 struct TwoPartDate {
   double day1 = 0;
   double day2 = 0;
 };
+[[nodiscard]] TwoPartDate utc_date(Epoch t) noexcept;
 [[nodiscard]] TwoPartDate terrestrial_time(Epoch t) noexcept;
 
 }  // namespace engine

@@ -89,6 +89,9 @@ RenderReport LatticeRenderer::render(const Snapshot& snapshot, Budget budget,
                                         : EarthshineModel::kVector;
   report.add(
       {"earthshine", name_of(taken), is_lamp ? snapshot.earthshine_rung.error_e : kNotKnown});
+  if (snapshot.earthshine_rung.albedo != AlbedoModel::kEven)
+    report.add({"earthshine's albedo", name_of(snapshot.earthshine_rung.albedo),
+                snapshot.earthshine_rung.albedo_error_e});
   texel_lamp_ = snapshot.sun.irradiance_w_m2 > 0.0 || cap_ ? 0 : 1;
   const double limit = budget.rho_mc > 0.0 ? budget.rho_mc : spec_.profile.rho_mc;
   light_up(snapshot);

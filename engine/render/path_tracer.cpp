@@ -91,6 +91,9 @@ RenderReport PathTracer::render(const Snapshot& snapshot, Budget budget, Radianc
   const bool cap = frames_[0].lamps.earth != nullptr;
   report.add({"earthshine", name_of(cap ? EarthshineModel::kCap : snapshot.earthshine_rung.model),
               cap ? 0.0 : snapshot.earthshine_rung.error_e});
+  if (snapshot.earthshine_rung.albedo != AlbedoModel::kEven)
+    report.add({"earthshine's albedo", name_of(snapshot.earthshine_rung.albedo),
+                snapshot.earthshine_rung.albedo_error_e});
   std::fill(row_counts_.begin(), row_counts_.end(), RowCounts{});
   choose_samples(snapshot, budget, out.region);
   run_passes(snapshot, budget, start, out, report);

@@ -20,6 +20,14 @@ enum class EarthshineModel : std::uint8_t {
 };
 [[nodiscard]] std::string_view name_of(EarthshineModel model) noexcept;
 
+/// The ladder of the Earth's albedo.
+enum class AlbedoModel : std::uint8_t {
+  kEven,   ///< one number
+  kZonal,  ///< zonal_albedo: by latitude and season
+  kMap     ///< place_albedo: sea, land, desert and ice in each zone
+};
+[[nodiscard]] std::string_view name_of(AlbedoModel model) noexcept;
+
 /// The air above the ground, as the limb shows it.
 struct Air {
   /// Vertical, of air without dust. Bodhaine et al. 1999, DOI
@@ -31,9 +39,9 @@ struct Air {
 
 struct EarthSpec {
   EarthshineModel earthshine = EarthshineModel::kVector;
-  double albedo = 0.3;              ///< in [0, 1], Lambert
-  bool albedo_by_latitude = false;  ///< zonal_albedo instead
-  bool in_frame = true;             ///< drawn where the camera sees it
+  AlbedoModel albedo_model = AlbedoModel::kEven;
+  double albedo = 0.3;   ///< kEven's, in [0, 1], Lambert
+  bool in_frame = true;  ///< drawn where the camera sees it
   Air air;
 };
 [[nodiscard]] EarthSpec read_earth(const ConfigTable& table);
@@ -42,7 +50,8 @@ struct EarthSpec {
 /// December 22; .2 at the equator, .53 to .73 at the poles, .34 on average.
 /// Source: Knocke, Ries & Tapley 1988, Earth radiation pressure effects on satellites, AIAA
 /// 88-4292, from the Earth radiation budget of Stephens et al. 1981; ECSS-E-ST-10-04C, annex F,
-/// recommends it. Leaves out land, sea and the clouds of the day: .05 to .6 from place to place.
+/// recommends it. In sunlight .31 on average. Leaves out land and sea, which place_albedo adds, and
+/// the clouds of the day: .05 to .6 from place to place.
 [[nodiscard]] ZonalAlbedo zonal_albedo(Epoch t) noexcept;
 
 /// The sensor and the surfaces that earthshine is judged by.
@@ -57,6 +66,8 @@ struct EarthshineSensor {
 struct EarthshineChoice {
   EarthshineModel model = EarthshineModel::kCap;
   double error_e = 0;  ///< the most that it is wrong by in a pixel, for a given EarthLight
+  AlbedoModel albedo = AlbedoModel::kEven;  ///< in the same words: of earthshine, not of the frame
+  double albedo_error_e = 0;                ///< of that, where the map is left out
 };
 
 /// The rung for `wanted` = kAuto, or `wanted` itself, and its bound.
@@ -65,6 +76,8 @@ struct EarthshineChoice {
 /// at most its albedo of the brightest radiance. Harmonics are wrong by 3/32 of the former and know
 /// nothing of the latter. Sigma is that of a pixel that earthshine alone falls on: in sunlight
 /// there is more noise.
+/// A map of the albedo is left out where what it changes, by the same two terms, and the rung's own
+/// error together are no more than the sensor sees; only with kAuto.
 /// For the vector's lamp the bound is all its light: a facet that sees half of the cap may get
 /// none. The paper's lamp has none: not a number.
 [[nodiscard]] EarthshineChoice choose_earthshine(EarthshineModel wanted, const EarthLight& light,

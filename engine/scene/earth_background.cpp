@@ -123,7 +123,7 @@ double EarthBackground::interpolation_error(int column, int row) const noexcept 
 
 void EarthBackground::find_fine_blocks(double block_radii, bool thin_air) noexcept {
   const EarthDisc<CameraFrame>& disc = earth_.disc;
-  const double dark = kDarkShare * disc.sun_irradiance_w_m2 / kPi * disc.albedo.largest();
+  const double dark = kDarkShare * disc.sun_irradiance_w_m2 / kPi * disc.largest_albedo();
   // How far the limb may bulge into a block whose corners it does not pass between.
   const double half_rad = 0.5 * std::hypot(kBlock_px, kBlock_px) * camera_.ifov_rad();
   const double bulge =

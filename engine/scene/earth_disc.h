@@ -1,31 +1,12 @@
 #pragma once
 
-#include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "engine/core/constants.h"
 #include "engine/core/vec.h"
+#include "engine/scene/earth_map.h"
 
 namespace engine {
-
-/// The share of sunlight that the Earth sends back, clouds and air included, by latitude: a series
-/// of Legendre polynomials in its sine.
-struct ZonalAlbedo {
-  std::array<double, 3> legendre{0.3, 0.0, 0.0};
-
-  [[nodiscard]] double at(double sin_latitude) const noexcept {
-    const double s = sin_latitude;
-    return legendre[0] + s * legendre[1] + 0.5 * (3.0 * s * s - 1.0) * legendre[2];
-  }
-  /// On the whole Earth. Of a parabola, at an end or where it is flat.
-  [[nodiscard]] double largest() const noexcept {
-    double most = std::max(at(-1.0), at(1.0));
-    const double flat_at = -legendre[1] / (3.0 * legendre[2]);
-    if (std::abs(flat_at) < 1.0) most = std::max(most, at(flat_at));
-    return most;
-  }
-};
 
 /// The Earth as an observer sees it: a Lambert sphere under a distant Sun, without air, its
 /// terminator sharp.
@@ -39,6 +20,8 @@ struct EarthDisc {
   double distance_radii = 0;  ///< of the observer from the centre; 1 or less: no Earth to be seen
   double sun_irradiance_w_m2 = 0;
   ZonalAlbedo albedo;
+  bool albedo_by_place = false;  ///< shared out among sea, land, desert and ice
+  Direction<Frame> greenwich{Eigen::Vector3d::UnitX()};  ///< on the equator; only for that
 
   [[nodiscard]] bool seen() const noexcept { return distance_radii > 1.0; }
   /// How far, in radii, the line along the unit vector `direction` passes from the centre; more
@@ -56,9 +39,19 @@ struct EarthDisc {
     const Eigen::Vector3d place = slant * direction - distance_radii * to_centre.unit;
     return p < 1.0 ? place : Eigen::Vector3d(place / p);
   }
+  [[nodiscard]] double albedo_at(const Eigen::Vector3d& vertical) const noexcept {
+    const double sin_latitude = vertical.dot(north.unit);
+    if (!albedo_by_place) return albedo.at(sin_latitude);
+    const Eigen::Vector3d east = north.unit.cross(greenwich.unit);
+    return place_albedo(albedo, {vertical.dot(greenwich.unit), vertical.dot(east), sin_latitude});
+  }
+  /// On the whole Earth.
+  [[nodiscard]] double largest_albedo() const noexcept {
+    return albedo_by_place ? largest_place_albedo(albedo) : albedo.largest();
+  }
   /// Of ground that the Sun shines on from the zenith.
   [[nodiscard]] double zenith_radiance_w_m2_sr(const Eigen::Vector3d& vertical) const noexcept {
-    return sun_irradiance_w_m2 / kPi * albedo.at(vertical.dot(north.unit));
+    return sun_irradiance_w_m2 / kPi * albedo_at(vertical);
   }
   /// 0 beyond the limb and on the night side. Pre: `direction` is a unit vector.
   [[nodiscard]] double radiance_w_m2_sr(const Eigen::Vector3d& direction) const noexcept {

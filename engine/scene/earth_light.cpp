@@ -62,7 +62,7 @@ EarthLight::EarthLight(const EarthDisc<BodyFrame>& disc) noexcept : disc_(disc) 
   const double highest_sun = std::atan2(sun_across_, sun_up_) < std::acos(cos_edge)
                                  ? 1.0
                                  : sun_up_ * cos_edge + sun_across_ * sin_edge;
-  largest_w_m2_sr_ = disc.sun_irradiance_w_m2 / kPi * disc.albedo.largest() * highest_sun;
+  largest_w_m2_sr_ = disc.sun_irradiance_w_m2 / kPi * disc.largest_albedo() * highest_sun;
   if (day) add_moments(0.0, at_terminator);
   if (terminator_in_cap) add_moments(at_terminator, widest);
 }
@@ -101,6 +101,7 @@ Vector3d EarthLight::direction_in(const Ring& ring, double azimuth) const noexce
 /// Adds the light of the rings between two angles, given as 1 - cos.
 /// At the limb, and where rings begin to be dark in part, the light rises as a square root: a step
 /// that is flat at both ends takes that away, and 16 nodes each way leave 1e-6.
+/// Of the coasts of a map they leave more: see the class.
 void EarthLight::add_moments(double from, double to) noexcept {
   for (std::size_t i = 0; i < kNodes; ++i) {
     const double s = kGauss.at[i];
@@ -116,12 +117,15 @@ void EarthLight::add_moments(double from, double to) noexcept {
       const Vector3d vertical = ring.sin_centre * outward - ring.cos_centre * disc_.to_centre.unit;
       const double cos_sun = vertical.dot(disc_.to_sun.unit);
       if (!(cos_sun > 0.0)) continue;
-      const double light =
-          cos_sun * disc_.zenith_radiance_w_m2_sr(vertical) * width * 2.0 * ring.lit_rad * weight;
+      const double albedo = disc_.albedo_at(vertical);
+      const double light = cos_sun * (disc_.sun_irradiance_w_m2 / kPi * albedo) * width * 2.0 *
+                           ring.lit_rad * weight;
       const Vector3d toward = ring.sin_nadir * outward + ring.cos_nadir * disc_.to_centre.unit;
       zeroth_ += light;
       first_ += light * toward;
       second_ += light * toward * toward.transpose();
+      const double zonal = disc_.albedo.at(vertical.dot(disc_.north.unit));
+      if (disc_.albedo_by_place) by_map_ += light * std::abs(1.0 - zonal / albedo);
     }
   }
 }

@@ -8,7 +8,10 @@ namespace engine {
 /// sample it as an area light, for those that need what a facet receives, and for lamps.
 ///
 /// Directions lead from the place to the Earth and are unit vectors in body axes.
-/// Thread: any. Loop-safe; making one takes some 10 us.
+/// Where the albedo goes by place, its coasts leave an error in the integrals below. Of the scalar
+/// irradiance, the worst of 560 places and Suns: .3 % from up to 800 km, 1.3 % from up to 2000 km,
+/// 2.4 % from 36 000 km, there of a thin crescent; rms .1, .2 and .5 %.
+/// Thread: any. Loop-safe; making one takes some 10 us, three times that with the albedo by place.
 class EarthLight {
  public:
   struct Sample {
@@ -41,6 +44,10 @@ class EarthLight {
   [[nodiscard]] const Eigen::Vector3d& vector_irradiance_w_m2() const noexcept { return first_; }
   /// The integral of L dw: no facet receives more.
   [[nodiscard]] double scalar_irradiance_w_m2() const noexcept { return zeroth_; }
+
+  /// The integral of what an albedo by place changes, brighter or darker: |L - L'| dw, L' being the
+  /// light of each latitude's own mean. 0 without.
+  [[nodiscard]] double moved_by_map_w_m2() const noexcept { return by_map_; }
 
   /// What a facet receives that sees nothing but the Earth and space, by spherical harmonics up to
   /// order 2: Ramamoorthi & Hanrahan 2001, DOI 10.1145/383259.383317. Written as moments of the
@@ -79,6 +86,7 @@ class EarthLight {
   double widest_ = 0;
   double largest_w_m2_sr_ = 0;
   double zeroth_ = 0;
+  double by_map_ = 0;
   Eigen::Vector3d first_ = Eigen::Vector3d::Zero();
   Eigen::Matrix3d second_ = Eigen::Matrix3d::Zero();
 };

@@ -1,5 +1,6 @@
 #include "engine/scene/snapshot_builder.h"
 
+#include "engine/orbit/earth_rotation.h"
 #include "engine/orbit/visibility.h"
 
 namespace engine {
@@ -59,8 +60,13 @@ EarthDisc<Frame> SnapshotBuilder::earth_from(const Position<J2000>& observer,
   disc.north = axes * Direction<J2000>{Eigen::Vector3d::UnitZ()};  // of J2000: .1 deg of latitude
   disc.distance_radii = observer.m.norm() / kEarthRadius_m;
   disc.sun_irradiance_w_m2 = sun_irradiance_w_m2(spec_.sun, sun.m.norm());
+  const AlbedoModel model = spec_.earth.albedo_model;
   disc.albedo =
-      spec_.earth.albedo_by_latitude ? zonal_albedo(now) : ZonalAlbedo{{spec_.earth.albedo, 0, 0}};
+      model == AlbedoModel::kEven ? ZonalAlbedo{{spec_.earth.albedo, 0, 0}} : zonal_albedo(now);
+  disc.albedo_by_place = model == AlbedoModel::kMap;
+  if (disc.albedo_by_place)
+    disc.greenwich =
+        axes * (earth_rotation(now).inverse() * Direction<EarthFixed>{Eigen::Vector3d::UnitX()});
   return disc;
 }
 
@@ -75,9 +81,15 @@ EarthshineChoice SnapshotBuilder::light_by_earth(const SightLine& line, const Bo
         lamp_of(paper_earth_lamp(line.target.position, spec_.earth.albedo, irradiance), axes);
     return choose_earthshine(wanted, {}, spec_.earthshine_sensor);
   }
-  const EarthLight light(earth_from(line.target.position, axes, sun, line.emitted));
-  const EarthshineChoice choice = choose_earthshine(wanted, light, spec_.earthshine_sensor);
+  EarthDisc<BodyFrame> disc = earth_from(line.target.position, axes, sun, line.emitted);
+  EarthLight light(disc);
+  EarthshineChoice choice = choose_earthshine(wanted, light, spec_.earthshine_sensor);
+  if (!disc.albedo_by_place) choice.albedo = spec_.earth.albedo_model;
   if (choice.model == EarthshineModel::kNone) return choice;
+  if (disc.albedo_by_place && choice.albedo != AlbedoModel::kMap) {
+    disc.albedo_by_place = false;
+    light = EarthLight(disc);
+  }
   const Eigen::Vector3d& irradiance_w_m2 = light.vector_irradiance_w_m2();
   if (!light.dark())
     out.earthshine = {direction_of<BodyFrame>(irradiance_w_m2), irradiance_w_m2.norm()};

@@ -42,22 +42,24 @@ void bench_passes_of_15_days(benchmark::State& state) {
 BENCHMARK(bench_passes_of_15_days)->Unit(benchmark::kMillisecond);
 
 /// 420 km up, the Sun 10 deg above the horizon there.
-EarthDisc<BodyFrame> earth_of_bench() {
+EarthDisc<BodyFrame> earth_of_bench(bool map) {
   EarthDisc<BodyFrame> disc;
   disc.to_sun = direction_of<BodyFrame>({1.0, 0.0, -0.18});
   disc.distance_radii = 1.066;
   disc.sun_irradiance_w_m2 = 1.0;
+  disc.north = direction_of<BodyFrame>({0.0, 1.0, 0.0});
+  disc.albedo_by_place = map;
   return disc;
 }
 
 void bench_earth_light(benchmark::State& state) {
-  const EarthDisc<BodyFrame> disc = earth_of_bench();
+  const EarthDisc<BodyFrame> disc = earth_of_bench(state.range(0) == 1);
   for (auto _ : state) benchmark::DoNotOptimize(EarthLight(disc));
 }
-BENCHMARK(bench_earth_light);
+BENCHMARK(bench_earth_light)->ArgName("even_map")->DenseRange(0, 1, 1);
 
 void bench_earth_light_sample(benchmark::State& state) {
-  const EarthLight light(earth_of_bench());
+  const EarthLight light(earth_of_bench(state.range(0) == 1));
   double u = 0;
   for (auto _ : state) {
     u += 0.618033988749895;
@@ -65,17 +67,17 @@ void bench_earth_light_sample(benchmark::State& state) {
     benchmark::DoNotOptimize(light.sample(u, 1.0 - u));
   }
 }
-BENCHMARK(bench_earth_light_sample);
+BENCHMARK(bench_earth_light_sample)->ArgName("even_map")->DenseRange(0, 1, 1);
 
 void bench_earth_light_radiance(benchmark::State& state) {
-  const EarthLight light(earth_of_bench());
+  const EarthLight light(earth_of_bench(state.range(0) == 1));
   Eigen::Vector3d direction(0.3, 0.2, 0.93);
   for (auto _ : state) {
     benchmark::DoNotOptimize(direction);
     benchmark::DoNotOptimize(light.radiance_w_m2_sr(direction));
   }
 }
-BENCHMARK(bench_earth_light_radiance);
+BENCHMARK(bench_earth_light_radiance)->ArgName("even_map")->DenseRange(0, 1, 1);
 
 /// Drawing the Earth and adding it to 1024 x 1024 px: none in view, all of the frame, its limb.
 void bench_earth_background(benchmark::State& state) {
@@ -89,6 +91,9 @@ void bench_earth_background(benchmark::State& state) {
   earth.disc.to_centre.unit = {0.0, std::sin(off), std::cos(off)};
   earth.disc.to_sun = direction_of<CameraFrame>({1.0, -0.3, -0.3});
   earth.disc.sun_irradiance_w_m2 = 633.0;
+  earth.disc.north = direction_of<CameraFrame>({1.0, 0.0, 0.0});
+  earth.disc.greenwich = direction_of<CameraFrame>({0.0, 1.0, 0.0});
+  earth.disc.albedo_by_place = state.range(1) == 1;
   IrradianceImage image(1024, 1024);
   for (auto _ : state) {
     background.draw(earth, 5e-7);
@@ -98,8 +103,8 @@ void bench_earth_background(benchmark::State& state) {
   }
 }
 BENCHMARK(bench_earth_background)
-    ->ArgName("none_full_limb")
-    ->DenseRange(0, 2, 1)
+    ->ArgNames({"none_full_limb", "even_map"})
+    ->ArgsProduct({{0, 1, 2}, {0, 1}})
     ->Unit(benchmark::kMicrosecond);
 
 void bench_brdf_eval(benchmark::State& state) {

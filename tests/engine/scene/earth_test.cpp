@@ -177,8 +177,9 @@ TEST(ReadEarth, KnowsItsModels) {
   for (const EarthshineModel model : {EarthshineModel::kVector, EarthshineModel::kHarmonics,
                                       EarthshineModel::kCap, EarthshineModel::kAuto})
     EXPECT_EQ(read("earthshine = \"" + std::string(name_of(model)) + "\"").earthshine, model);
-  EXPECT_FALSE(read("albedo = 0.2").albedo_by_latitude);
-  EXPECT_TRUE(read("albedo = \"map\"").albedo_by_latitude);
+  EXPECT_EQ(read("albedo = 0.2").albedo_model, AlbedoModel::kEven);
+  for (const AlbedoModel model : {AlbedoModel::kZonal, AlbedoModel::kMap})
+    EXPECT_EQ(read("albedo = \"" + std::string(name_of(model)) + "\"").albedo_model, model);
   EXPECT_TRUE(read("").in_frame);
   EXPECT_FALSE(read("in_frame = \"no\"").in_frame);
   EXPECT_EQ(read("air_optical_depth = 0.0").air.optical_depth, 0.0);
