@@ -183,9 +183,13 @@ hil::Detection Tracker::detect(const drivers::FrameView& view) {
   sky_.measure(image);
   mark_differences(image);
   const Region region = choose_region(view);
+  covered_px_ = 0.0;
   if (region.label == 0) return {};
   const bool hides = hides_its_sky(image, region);
-  if (hides) find_cover(image, region);
+  if (hides) {
+    find_cover(image, region);
+    covered_px_ = cv::sum(cover_)[0];
+  }
   const cv::Rect& box = region.box;
   double sum = 0;
   double sum_u = 0;
@@ -216,7 +220,7 @@ hil::Detection Tracker::detect(const drivers::FrameView& view) {
                      edge(box.y + box.height, -4)}};
 }
 
-void Tracker::filter(const drivers::FrameView& view, const hil::Detection& detection) noexcept {
+void Tracker::filter(const drivers::FrameView& view, hil::Detection& detection) noexcept {
   if (detection.confidence <= 0.0F) return;
   const engine::SimTime middle = view.frame.shutter_open + view.frame.exposure / 2;
   // Where the target is seen, less where it ought to be seen; the boresight has to move that way.
@@ -226,13 +230,25 @@ void Tracker::filter(const drivers::FrameView& view, const hil::Detection& detec
       (detection.centroid_px.v - std::floor(0.5 * height_px_)) * spec_.ifov_rad +
           view.frame.trim_rad[1]};
   const double dt = engine::seconds(middle - last_seen_);
+  const auto predicted_rad = [&](std::size_t i) {
+    return axes_[i].offset_rad + axes_[i].rate_rad_s * dt;
+  };
+  const double surprise_px =
+      std::hypot(measured[0] - predicted_rad(0), measured[1] - predicted_rad(1)) / spec_.ifov_rad;
+  // Before a dark sky what cannot be seen has no light, and there is nothing to be mistaken in.
+  if (!(covered_px_ > 0.0)) {
+    gate_.forget();
+  } else if (!gate_.believes(covered_px_, surprise_px, middle)) {
+    detection.confidence = 0.5F;
+    return;
+  }
   for (std::size_t i = 0; i < 2; ++i) {
     Axis& axis = axes_[i];
     if (!locked_ || !(dt > 0.0)) {
       axis = {measured[i], 0.0};
       continue;
     }
-    const double predicted = axis.offset_rad + axis.rate_rad_s * dt;
+    const double predicted = predicted_rad(i);
     const double surprise = measured[i] - predicted;
     axis.offset_rad = predicted + spec_.alpha * surprise;
     axis.rate_rad_s += spec_.beta * surprise / dt;

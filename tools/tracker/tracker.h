@@ -10,6 +10,7 @@
 
 #include "drivers/frame_packet.h"
 #include "hil/space_packet.h"
+#include "tools/tracker/shape_gate.h"
 #include "tools/tracker/sky.h"
 
 namespace tracker {
@@ -34,6 +35,8 @@ struct TrackerSpec {
 /// Before a bright sky, the Earth, a target is partly darker than what it hides. Its own light is
 /// then what differs plus what it hides of the sky: the sky's level times how much of each pixel it
 /// covers. That is 1 inside; at an edge the share that the difference has of the largest beside it.
+/// A part that becomes as bright as the sky is lost for as long: a place that jumps together with
+/// the target's area is reported with half of the confidence, and the filter goes on without it.
 /// Leaves out: a target that touches what crosses the frame, as the Earth's limb does where it is
 /// sharp; parts as bright as the sky are taken for sky, and gaps under 5 px for target; on a
 /// telescope 60 to 130 px across that is 0.2 to 1.5 px of its centre.
@@ -62,7 +65,7 @@ class Tracker {
   [[nodiscard]] bool hides_its_sky(const cv::Mat& image, const Region& region) const;
   void find_cover(const cv::Mat& image, const Region& region);
   [[nodiscard]] bool expected_in(const cv::Rect& box, const drivers::FrameView& view) const;
-  void filter(const drivers::FrameView& view, const hil::Detection& detection) noexcept;
+  void filter(const drivers::FrameView& view, hil::Detection& detection) noexcept;
 
   TrackerSpec spec_;
   int width_px_;
@@ -71,7 +74,9 @@ class Tracker {
   cv::Mat differs_;  ///< 255: off the sky by more than the threshold
   cv::Mat grown_;    ///< the same over gaps
   cv::Mat labels_;   ///< of regions of grown_
-  cv::Mat cover_;    ///< of a region's box: how much of a pixel the target covers, 0 to 1
+  ShapeGate gate_;
+  cv::Mat cover_;          ///< of a region's box: how much of a pixel the target covers, 0 to 1
+  double covered_px_ = 0;  ///< of a sky that the target hides; 0: it hides none
   std::array<Axis, 2> axes_{};
   bool locked_ = false;
   engine::SimTime last_seen_{};
