@@ -1,6 +1,7 @@
 #include "engine/render/facets.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 
@@ -13,7 +14,6 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using Eigen::Vector3f;
 
-constexpr int kFacetsAShare = 64;
 constexpr double kCrease_rad = 40.0 * kDegree;
 // A spread below this is a flat facet with rounding.
 constexpr float kFlat_rad = 1e-3F;
@@ -48,7 +48,7 @@ Matrix3d basis_round(const Vector3d& n) noexcept {
 }
 
 Facets::Facets(const Mesh& mesh, std::vector<Brdf> brdfs)
-    : radiance_(mesh.triangles.size()), brdfs_(std::move(brdfs)) {
+    : brdfs_(std::move(brdfs)), known_(mesh.triangles.size()) {
   facets_.reserve(mesh.triangles.size());
   const std::vector<CornerNormals> normals = smooth_normals(mesh, kCrease_rad);
   for (const Mesh::Triangle& t : mesh.triangles) {
@@ -70,14 +70,28 @@ Facets::Facets(const Mesh& mesh, std::vector<Brdf> brdfs)
   }
 }
 
-void Facets::light_up(const BodyView& view, WorkerPool& pool, double sun_radius_rad) noexcept {
-  const int count = static_cast<int>(facets_.size());
-  const LampCones lamps = lamp_cones(view, sun_radius_rad);
-  pool.rows(0, (count + kFacetsAShare - 1) / kFacetsAShare, [&](int share) {
-    const int last = std::min(count, (share + 1) * kFacetsAShare);
-    for (int i = share * kFacetsAShare; i < last; ++i)
-      light_facet(view, lamps, static_cast<std::size_t>(i));
-  });
+void Facets::light_up(const BodyView& view, double sun_radius_rad) noexcept {
+  ++view_;
+  camera_ = view.camera.m;
+  lamps_ = lamp_cones(view, sun_radius_rad);
+}
+
+std::array<float, kLamps> Facets::radiance(std::uint32_t triangle) const noexcept {
+  constexpr auto kRelaxed = std::memory_order_relaxed;
+  Known& known = known_[triangle];
+  const std::atomic_ref view(known.view);
+  std::array<float, kLamps> light{};
+  // Acquire: the light was written before the view that it is of.
+  if (view.load(std::memory_order_acquire) == view_) {
+    for (std::size_t k = 0; k < kLamps; ++k)
+      light[k] = std::atomic_ref(known.radiance[k]).load(kRelaxed);
+    return light;
+  }
+  light = light_of(facets_[triangle]);
+  for (std::size_t k = 0; k < kLamps; ++k)
+    std::atomic_ref(known.radiance[k]).store(light[k], kRelaxed);
+  view.store(view_, std::memory_order_release);
+  return light;
 }
 
 double Facets::reflected(const Facet& facet, double side, const LampCone& lamp,
@@ -127,17 +141,17 @@ double Facets::reflected(const Facet& facet, double side, const LampCone& lamp,
   return sum / (n * n * each);
 }
 
-void Facets::light_facet(const BodyView& view, const LampCones& lamps, std::size_t index) noexcept {
-  const Facet& facet = facets_[index];
-  radiance_[index] = {};
+std::array<float, kLamps> Facets::light_of(const Facet& facet) const noexcept {
+  std::array<float, kLamps> light{};
   const Vector3d middle = (facet.corner + (facet.edge1 + facet.edge2) / 3.0F).cast<double>();
-  const Vector3d to_camera = (view.camera.m - middle).normalized();
+  const Vector3d to_camera = (camera_ - middle).normalized();
   const double side = facet.normal.cast<double>().dot(to_camera) >= 0.0 ? 1.0 : -1.0;
   for (std::size_t k = 0; k < kLamps; ++k) {
-    if (!(lamps[k].irradiance_w_m2() > 0.0)) continue;
-    radiance_[index][k] = static_cast<float>(lamps[k].irradiance_w_m2() *
-                                             reflected(facet, side, lamps[k], to_camera));
+    if (!(lamps_[k].irradiance_w_m2() > 0.0)) continue;
+    light[k] = static_cast<float>(lamps_[k].irradiance_w_m2() *
+                                  reflected(facet, side, lamps_[k], to_camera));
   }
+  return light;
 }
 
 SurfacePoint Facets::at(const MeshHit& hit, const Vector3f& direction) const noexcept {

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <vector>
 
-#include "engine/core/worker_pool.h"
 #include "engine/render/embree_scene.h"
 #include "engine/render/lamp_cone.h"
 #include "engine/scene/brdf.h"
@@ -28,8 +28,9 @@ struct SurfacePoint {
 /// The triangles as shading sees them, and the direct light that each sends to the camera.
 ///
 /// Lamps are parallel and the camera is far: over one facet the direct light is the same for every
-/// ray, so it is worked out once a frame for each facet's middle instead of once a sample. At 70 km
-/// a facet of 4 m turns the view by 3e-5 rad, .5 % of the flank of the narrowest lobe.
+/// ray, so it is worked out once a frame for each facet's middle instead of once a sample, when the
+/// first ray asks: of a fine mesh most facets face away, or lie between rays. At 70 km a facet of
+/// 4 m turns the view by 3e-5 rad, .5 % of the flank of the narrowest lobe.
 ///
 /// Facets stand for a smooth surface: where a glint is near, a facet sends the mean over the
 /// normals of the surface it replaces. Flat facets would flash one after the other, three times too
@@ -38,19 +39,16 @@ struct SurfacePoint {
 /// Where a glint is near and the lobe narrow, the Sun is its disc and not a point: at the top of a
 /// lobe .4 deg wide that takes 12 %; half a degree off it takes 1.3 %, and is left out there.
 ///
-/// Thread: loop. Loop-safe but for the constructor.
+/// Thread: light_up() the loop's, the rest any. Loop-safe but for the constructor.
 class Facets {
  public:
   Facets(const Mesh& mesh, std::vector<Brdf> brdfs);
 
-  /// Works out the direct light of every facet, shadows apart. Sun of radius 0: a point.
-  void light_up(const BodyView& view, WorkerPool& pool,
-                double sun_radius_rad = kSunAngularRadius_rad) noexcept;
+  /// Where the camera is and the lamps are from now on. Sun of radius 0: a point.
+  void light_up(const BodyView& view, double sun_radius_rad = kSunAngularRadius_rad) noexcept;
 
   /// What facet `triangle` sends to the camera for each lamp, in W/m^2/sr, when nothing shades it.
-  [[nodiscard]] const std::array<float, kLamps>& radiance(std::uint32_t triangle) const noexcept {
-    return radiance_[triangle];
-  }
+  [[nodiscard]] std::array<float, kLamps> radiance(std::uint32_t triangle) const noexcept;
   /// The place of a hit; the normal on the side that `direction` comes from.
   [[nodiscard]] SurfacePoint at(const MeshHit& hit,
                                 const Eigen::Vector3f& direction) const noexcept;
@@ -89,11 +87,19 @@ class Facets {
   };
   [[nodiscard]] double reflected(const Facet& facet, double side, const LampCone& lamp,
                                  const Eigen::Vector3d& to_camera) const noexcept;
-  void light_facet(const BodyView& view, const LampCones& lamps, std::size_t index) noexcept;
+  [[nodiscard]] std::array<float, kLamps> light_of(const Facet& facet) const noexcept;
 
+  /// What is known of a facet's light. Threads that ask at once all find the same.
+  struct Known {
+    std::array<float, kLamps> radiance{};
+    std::uint64_t view = 0;  ///< that it was worked out for
+  };
   std::vector<Facet> facets_;
-  std::vector<std::array<float, kLamps>> radiance_;
   std::vector<Brdf> brdfs_;  ///< by the mesh's material index
+  mutable std::vector<Known> known_;
+  std::uint64_t view_ = 1;  ///< counts up
+  Eigen::Vector3d camera_ = Eigen::Vector3d::UnitZ();
+  LampCones lamps_;
 };
 
 }  // namespace engine

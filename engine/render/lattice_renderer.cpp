@@ -134,8 +134,7 @@ RenderReport LatticeRenderer::render(const Snapshot& snapshot, Budget budget,
 void LatticeRenderer::light_up(const Snapshot& snapshot) noexcept {
   BodyView direct = snapshot;
   if (cap_) direct.earthshine.irradiance_w_m2 = 0.0;
-  target_->facets.light_up(direct, pool_,
-                           spec_.sun_disc == SunDisc::kOff ? 0.0 : kSunAngularRadius_rad);
+  target_->facets.light_up(direct, spec_.sun_disc == SunDisc::kOff ? 0.0 : kSunAngularRadius_rad);
   const auto lamps = lamps_of(snapshot);
   for (std::size_t k = 0; k < kLamps; ++k) {
     toward_lamp_[k] = lamps[k]->toward.unit.cast<float>();

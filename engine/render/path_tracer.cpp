@@ -136,7 +136,7 @@ void PathTracer::light_up(const Snapshot& snapshot, RenderReport& report) noexce
     frames_[i] =
         TracedFrame(view, spec_.camera, bodies_.shape(i).bounding_radius_m, sun_radius_rad);
     frames_[i].seen = seen;
-    if (!seen.empty()) bodies_.light_up(i, view, pool_, glint_radius_rad);
+    if (!seen.empty()) bodies_.light_up(i, view, glint_radius_rad);
   }
 }
 

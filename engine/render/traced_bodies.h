@@ -46,9 +46,8 @@ class TracedBodies {
   /// Where the bodies are from now on. Pre: the snapshot has as many companions, or more.
   void place(const Snapshot& snapshot) noexcept;
   /// The facets of one, as Facets has it.
-  void light_up(std::size_t body, const BodyView& view, WorkerPool& pool,
-                double sun_radius_rad) noexcept {
-    bodies_[body].facets->light_up(view, pool, sun_radius_rad);
+  void light_up(std::size_t body, const BodyView& view, double sun_radius_rad) noexcept {
+    bodies_[body].facets->light_up(view, sun_radius_rad);
   }
   /// How far a shadow can fall when the Sun is where the snapshot says: from one side of a body to
   /// the other, or to another body.

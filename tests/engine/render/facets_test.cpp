@@ -1,9 +1,11 @@
 #include "engine/render/facets.h"
 
+#include <atomic>
 #include <random>
 
 #include <gtest/gtest.h>
 
+#include "engine/core/worker_pool.h"
 #include "tests/support/scenes.h"
 
 namespace engine {
@@ -34,11 +36,10 @@ TEST(Facets, LightIsIrradianceTimesBrdfTimesCosine) {
   test_support::add_plate(mesh, "white", {-1, -1, 0}, {2, 0, 0}, {0, 2, 0});
   Facets facets(mesh, {Brdf(test_support::lambert(0.3), Brdf::Variant::kPhysical)});
   Snapshot snapshot = test_support::look_at_origin({0, 0, 1e5}, {0, 1, 0});
-  WorkerPool pool(1);
   for (const double deg : {0.0, 30.0, 60.0, 89.0, 91.0, 180.0}) {
     snapshot.sun = {{{std::sin(deg * kDegree), 0.0, std::cos(deg * kDegree)}}, 600.0};
     snapshot.earthshine = {{{0.0, 0.0, 1.0}}, 50.0};
-    facets.light_up(snapshot, pool);
+    facets.light_up(snapshot);
     const double want = deg < 90.0 ? 600.0 * 0.3 / kPi * std::cos(deg * kDegree) : 0.0;
     for (const std::uint32_t t : {0U, 1U}) {
       EXPECT_NEAR(static_cast<double>(facets.radiance(t)[0]), want, 6e-8 * 60.0) << deg;
@@ -70,10 +71,9 @@ double disc_over_point(const FiveParameters& surface, double off_deg, double wri
       test_support::look_at_origin(1e5 * Vector3d(std::sin(from), 0, std::cos(from)), {0, 1, 0});
   const double sun = -(30.0 + off_deg) * kDegree;
   snapshot.sun = {{{std::sin(sun), 0.0, std::cos(sun)}}, 600.0};
-  WorkerPool pool(1);
-  facets.light_up(snapshot, pool);
+  facets.light_up(snapshot);
   const auto disc = static_cast<double>(facets.radiance(0)[0]);
-  facets.light_up(snapshot, pool, 0.0);
+  facets.light_up(snapshot, 0.0);
   return disc / static_cast<double>(facets.radiance(0)[0]);
 }
 
@@ -103,16 +103,15 @@ TEST(SunDisc, KeepsTheLightOfAGlint) {
   test_support::add_plate(mesh, "glossy", {-1, -1, 0}, {2, 0, 0}, {0, 2, 0});
   Facets facets(mesh, {Brdf(test_support::polyimide(), Brdf::Variant::kPhysical)});
   Snapshot snapshot = test_support::look_at_origin({0, 0, 1e5}, {0, 1, 0});
-  WorkerPool pool(1);
   constexpr double kStep_rad = 0.1 * kDegree;
   for (int i = -30; i <= 30; ++i) {
     for (int j = -30; j <= 30; ++j) {
       // Between the facet's middle and the origin lies a third of a metre, at 100 km.
       const Vector3d to_sun((i + 0.37) * kStep_rad, (j + 0.21) * kStep_rad, 1.0);
       snapshot.sun = {direction_of<BodyFrame>(to_sun), 600.0};
-      facets.light_up(snapshot, pool);
+      facets.light_up(snapshot);
       disc += static_cast<double>(facets.radiance(0)[0]);
-      facets.light_up(snapshot, pool, 0.0);
+      facets.light_up(snapshot, 0.0);
       point += static_cast<double>(facets.radiance(0)[0]);
     }
   }
@@ -124,11 +123,10 @@ TEST(Facets, NoLightBeyondTheTerminatorByMoreThanAFacetsOwnAngle) {
   // more than its normals differ must stay dark.
   const Mesh ball = test_support::sphere(5.0F, 24, 48, "glossy");
   Facets facets(ball, {Brdf(test_support::polyimide(), Brdf::Variant::kPhysical)});
-  WorkerPool pool(1);
   for (const double phase_deg : {30.0, 90.0, 150.0, 178.0}) {
     Snapshot snapshot = test_support::look_at_origin({1e5, 0, 0}, {0, 0, 1});
     snapshot.sun = {{{std::cos(phase_deg * kDegree), std::sin(phase_deg * kDegree), 0.0}}, 600.0};
-    facets.light_up(snapshot, pool);
+    facets.light_up(snapshot);
     int lit = 0;
     for (std::uint32_t t = 0; t < ball.triangles.size(); ++t) {
       const SurfacePoint place = facets.on_side(t, 0.3F, 0.3F, 0);
@@ -142,6 +140,28 @@ TEST(Facets, NoLightBeyondTheTerminatorByMoreThanAFacetsOwnAngle) {
       }
     }
     EXPECT_GT(lit, 0) << phase_deg;
+  }
+}
+
+TEST(Facets, LightIsTheSameWhoeverAsksFirst) {
+  const Mesh ball = test_support::sphere(5.0F, 24, 48, "glossy");
+  Facets alone(ball, {Brdf(test_support::polyimide(), Brdf::Variant::kPhysical)});
+  Facets shared = alone;
+  WorkerPool pool(4);
+  for (const double phase_deg : {30.0, 60.0}) {
+    Snapshot snapshot = test_support::look_at_origin({1e5, 0, 0}, {0, 0, 1});
+    snapshot.sun = {{{std::cos(phase_deg * kDegree), std::sin(phase_deg * kDegree), 0.0}}, 600.0};
+    alone.light_up(snapshot);
+    shared.light_up(snapshot);
+    const auto count = static_cast<std::uint32_t>(ball.triangles.size());
+    std::atomic<int> differs{0};
+    pool.rows(0, 8, [&](int row) {
+      for (std::uint32_t t = 0; t < count; ++t)
+        differs += shared.radiance((t + 7U * static_cast<std::uint32_t>(row)) % count)[0] < 0.0F;
+    });
+    for (std::uint32_t t = 0; t < count; ++t)
+      differs += shared.radiance(t) != alone.radiance(t) ? 1 : 0;
+    EXPECT_EQ(differs.load(), 0) << phase_deg;
   }
 }
 

@@ -155,7 +155,7 @@ TEST(FarLight, WhatIsKeptOfAGlintIsWithinTheChangeAllowed) {
     const Snapshot snapshot = seen(2e6 * Vector3d(std::sin(a), 0, std::cos(a)),
                                    {-std::sin(30.0 * kDegree), 0, std::cos(30.0 * kDegree)});
     renewals += renewed(kept.light, snapshot, kChange) ? 1 : 0;
-    panel.facets.light_up(snapshot, kept.pool);
+    panel.facets.light_up(snapshot);
     const double want = static_cast<double>(panel.facets.radiance(0)[0]) * 24.0 * std::cos(a);
     worst = std::max(worst, std::abs(kept.light.intensity_w_sr() / want - 1.0));
     brightest = std::max(brightest, want);
