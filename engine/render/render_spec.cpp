@@ -7,6 +7,7 @@
 #include "engine/render/bounced_light.h"
 #include "engine/render/far_target.h"
 #include "engine/render/lattice_renderer.h"
+#include "engine/render/mesh_levels.h"
 #include "engine/render/path_tracer.h"
 
 namespace engine {
@@ -53,6 +54,8 @@ RenderSpec read_render(const ConfigTable& table) {
                                                    {{"auto", FarTargetForm::kAuto},
                                                     {"resolved", FarTargetForm::kResolved},
                                                     {"point", FarTargetForm::kPoint}});
+  spec.mesh_level = table.choice_or<MeshLevelChoice>(
+      "mesh_level", "full", {{"auto", MeshLevelChoice::kAuto}, {"full", MeshLevelChoice::kFull}});
   spec.bounce_share = table.number_or("bounce_share", 0.15, between(0.001, 1.0));
   return spec;
 }
@@ -65,12 +68,22 @@ std::unique_ptr<Renderer> make_renderer(
     const RenderSpec its = with_bounces_settled(spec, *companion);
     if (its.bounces > settled.bounces) settled = its;
   }
-  std::unique_ptr<Renderer> resolved;
-  if (settled.method == RenderMethod::kPaths) {
-    resolved = std::make_unique<PathTracer>(settled, target, pool, companions);
-  } else {
-    ENSURE(companions.empty());
-    resolved = std::make_unique<LatticeRenderer>(settled, target, pool);
+  ENSURE(settled.method == RenderMethod::kPaths || companions.empty());
+  const auto resolving = [&](const std::shared_ptr<TracedTarget>& shape) {
+    std::unique_ptr<Renderer> made;
+    if (settled.method == RenderMethod::kPaths) {
+      made = std::make_unique<PathTracer>(settled, shape, pool, companions);
+    } else {
+      made = std::make_unique<LatticeRenderer>(settled, shape, pool);
+    }
+    return made;
+  };
+  std::unique_ptr<Renderer> resolved = resolving(target);
+  if (!target->coarser.empty() && companions.empty()) {
+    std::vector<std::unique_ptr<Renderer>> levels;
+    levels.push_back(std::move(resolved));
+    for (const CoarserTarget& level : target->coarser) levels.push_back(resolving(level.target));
+    resolved = std::make_unique<LevelledRenderer>(settled, *target, std::move(levels));
   }
   // Bodies that may hide and shade each other have no light as a whole.
   if (settled.far_target == FarTargetForm::kResolved || !companions.empty()) return resolved;

@@ -34,6 +34,12 @@ enum class FarTargetForm : std::uint8_t {
   kPoint      ///< a point, whatever its size
 };
 
+/// Which mesh a fine target is drawn with: LevelledRenderer.
+enum class MeshLevelChoice : std::uint8_t {
+  kFull,
+  kAuto  ///< by its size and the sensor's noise
+};
+
 /// What errors a frame may have, as shares of the sensor's noise.
 struct RenderProfile {
   double rho_total = 0.3;  ///< of all model errors together
@@ -58,6 +64,7 @@ struct RenderSpec {
   bool exact_caustics = false;                   ///< paths
   SunDisc sun_disc = SunDisc::kAuto;
   FarTargetForm far_target = FarTargetForm::kAuto;
+  MeshLevelChoice mesh_level = MeshLevelChoice::kFull;
   CameraGeometry camera;
   GridWish grid;
   SensorNoise noise;
@@ -65,7 +72,8 @@ struct RenderSpec {
 };
 [[nodiscard]] RenderSpec read_render(const ConfigTable& table);
 
-/// The renderer that the spec asks for. May throw. Pre: with companions the method is kPaths.
+/// The renderer that the spec asks for; a target with coarser meshes is drawn with them, but for
+/// one with companions. May throw. Pre: with companions the method is kPaths.
 [[nodiscard]] std::unique_ptr<Renderer> make_renderer(
     const RenderSpec& spec, std::shared_ptr<TracedTarget> target, WorkerPool& pool,
     const std::vector<std::shared_ptr<TracedTarget>>& companions = {});

@@ -14,13 +14,22 @@ std::string material_missing(const std::string& name) {
          name;
 }
 
+bool alike(const Material& a, const Material& b) {
+  return a.parameters == b.parameters && a.variant == b.variant && a.wrinkle_rad == b.wrinkle_rad;
+}
+
 std::vector<Brdf> in_mesh_order(const Mesh& mesh, const std::vector<Material>& materials) {
   std::vector<Brdf> brdfs;
+  std::vector<const Material*> made;
   for (const std::string& name : mesh.material_names) {
     const auto it = std::find_if(materials.begin(), materials.end(),
                                  [&](const Material& m) { return m.name == name; });
     if (it == materials.end()) throw ConfigError(material_missing(name));
-    brdfs.push_back(it->brdf());
+    // Their tables are dear, and a simplified mesh has many alike.
+    const auto same = std::ranges::find_if(made, [&](const Material* m) { return alike(*m, *it); });
+    brdfs.push_back(same == made.end() ? it->brdf()
+                                       : brdfs[static_cast<std::size_t>(same - made.begin())]);
+    made.push_back(&*it);
   }
   return brdfs;
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "engine/render/embree_scene.h"
@@ -7,6 +8,22 @@
 #include "engine/scene/mesh.h"
 
 namespace engine {
+
+struct TracedTarget;
+
+/// The same target in fewer triangles.
+struct CoarserTarget {
+  std::shared_ptr<TracedTarget> target;
+  double rms_m = 0;  ///< how far its surface is off, by area
+  /// A facet that stands for a rough surface with a lobe narrower than that: a glint of it is the
+  /// wrinkles', and no lobe makes up for them.
+  struct Gloss {
+    Eigen::Vector3f normal = Eigen::Vector3f::UnitZ();
+    float reach_rad = 0;  ///< of a half vector, up to where it can be told
+    float area_m2 = 0;
+  };
+  std::vector<Gloss> gloss;
+};
 
 /// The target as renderers need it: triangles, what rays meet, and how facets reflect.
 struct TracedTarget {
@@ -17,6 +34,7 @@ struct TracedTarget {
   double bounding_radius_m;
   EmbreeScene scene;
   Facets facets;
+  std::vector<CoarserTarget> coarser;  ///< finest first; none unless somebody made them
 };
 
 }  // namespace engine

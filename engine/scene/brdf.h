@@ -16,6 +16,7 @@ struct FiveParameters {
   double kb = 15.42;
   double kd = 0.047;
   double kr = 0.717;
+  [[nodiscard]] bool operator==(const FiveParameters&) const = default;
 };
 
 /// How directions of bounces are drawn.

@@ -7,6 +7,7 @@
 
 #include "engine/core/constants.h"
 #include "engine/orbit/utc.h"
+#include "engine/render/mesh_levels.h"
 #include "engine/render/traced_target.h"
 #include "engine/scene/telescope.h"
 #include "hil/steady_clock.h"
@@ -305,6 +306,8 @@ Rig::Rig(const Scenario& scenario, int threads)
   scene.earthshine_sensor = earthshine_sensor(render.noise, scenario.materials);
   const auto bodies = traced_bodies(scenario);
   for (const auto& body : bodies) triangles_ += body->mesh.triangles.size();
+  if (render.mesh_level == engine::MeshLevelChoice::kAuto && bodies.size() == 1)
+    engine::add_mesh_levels(*bodies.front(), scenario.materials, render);
   std::unique_ptr<engine::Starlight> stars;
   if (scenario.stars.source != engine::StarSpec::Source::kNone) {
     const engine::StarCatalogue catalogue =
