@@ -70,7 +70,8 @@ struct Among {
   explicit Among(double at) noexcept {
     const double middle = std::floor(at + 0.5);
     const double f = at - middle;
-    first = static_cast<int>(middle) - 1;
+    // A place that is no number is at the start: its shares are none either.
+    first = middle >= 0.0 ? static_cast<int>(middle) - 1 : -1;
     share = {0.5 * (0.5 - f) * (0.5 - f), 0.75 - f * f, 0.5 * (0.5 + f) * (0.5 + f)};
   }
 };
