@@ -12,10 +12,11 @@ namespace engine {
 /// Two errors look like noise. Of n by n points a pixel, an edge between two radiances leaves the
 /// share p of either unsure: its variance is some n^-3 p (1 - p), over edges of all places and
 /// directions; for many tones the variance between them stands for p (1 - p). And light that
-/// bounces is known from few rays, each cell's for itself. Measured on two
-/// telescopes: right to 25 % after the optics, up to 1.7 times too small before them.
-/// Leaves out: what a mirror sees, by a ray a facet and pixel.
-/// Thread: pixel() any, the rest the loop's. Loop-safe but for the constructor.
+/// bounces is known from few rays, each cell's for itself. Measured on two telescopes: right to 25
+/// % after the optics (where bounces count a texel's noise is an upper bound: up to twice), up
+/// to 1.7 times too small before them. Leaves out: what a mirror sees, by a ray a facet and pixel.
+/// Thread: set(), of a pixel each, and too_noisy() any; the rest the loop's. Loop-safe but for the
+/// constructor.
 class LatticeNoise {
  public:
   /// Of a pixel's points, whatever they see.
