@@ -18,7 +18,10 @@ constexpr double kDirectionsARadian = 1000.0;
 // What stands above a plane by less is taken to lie on it: corners are whole sixteenths of a step
 // on the map, so a plane is off by that on its slope, and rounding adds some.
 constexpr float kAbove_steps = 0.05F;
-constexpr float kAcross_steps = 0.25F;
+constexpr float kAcross_steps = 0.0625F;
+// The rest of a hollow stands above the plane of a facet at its bottom that is smaller than a step.
+// What casts a shadow there stands higher.
+constexpr float kShades_steps = 3.0F;
 constexpr int kMostSteps = 24;
 
 // By column of the map.
@@ -96,12 +99,15 @@ Lit LampView::places(std::uint32_t facet, const Eigen::Vector2f& low,
   const int bottom = static_cast<int>(high.y()) + 2;
   if (right - left > kMostSteps || bottom - top > kMostSteps) return Lit::kUnknown;
   const Plane& plane = planes_[facet];
-  const float margin = kAbove_steps * 2.0F * static_cast<float>(radius_m_) / kSide +
-                       kAcross_steps * (std::abs(plane.per_x) + std::abs(plane.per_y));
+  const float m_a_step = 2.0F * static_cast<float>(radius_m_) / kSide;
+  const float margin =
+      kAbove_steps * m_a_step + kAcross_steps * (std::abs(plane.per_x) + std::abs(plane.per_y));
+  const float shades = kShades_steps * m_a_step;
   // No number for facets seen edge-on, and where the lamp's direction is none.
   if (!(margin < std::numeric_limits<float>::infinity())) return Lit::kUnknown;
   const int columns = right - left;
   int above = 0;
+  int shading = 0;
   int asked = 0;
   for (int j = top; j < bottom; ++j) {
     const float* nearness = &nearness_[static_cast<std::size_t>(j) * kSide];
@@ -112,9 +118,10 @@ Lit LampView::places(std::uint32_t facet, const Eigen::Vector2f& low,
       const float height = row + plane.per_y * kYInStep[static_cast<std::size_t>(i)] +
                            plane.per_x * static_cast<float>(i);
       above += nearness[i] > height ? 1 : 0;
+      shading += nearness[i] > height + shades ? 1 : 0;
     }
     asked += columns;
-    if (above != 0 && above != asked) return Lit::kUnknown;
+    if (above != 0 && shading != asked) return Lit::kUnknown;
   }
   return above == 0 ? Lit::kYes : Lit::kNo;
 }

@@ -15,7 +15,8 @@ enum class Lit : std::uint8_t { kUnknown, kYes, kNo };
 /// shadows has a ray to be asked.
 ///
 /// A map of the surfaces nearest to the lamp, on a lattice of 1024 steps. Places are in the light
-/// where nothing round them stands above their facet's plane, in the dark where everything does.
+/// where nothing round them stands above their facet's plane, in the dark where everything does, by
+/// some steps: the walls of a hollow stand above the plane of its floor and leave it lit.
 /// A shadow or a gap narrower than a step, .2 % of the target's radius, is missed where no other
 /// edge is near. Directions are rounded to 1 mrad, which moves a shadow by 5 mm over 10 m; what is
 /// kept is a function of the rounded direction alone.

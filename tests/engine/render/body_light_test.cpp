@@ -6,7 +6,6 @@
 
 #include <gtest/gtest.h>
 
-#include "engine/render/lamp_view.h"
 #include "engine/render/texel_light.h"
 #include "tests/support/scenes.h"
 
@@ -293,35 +292,6 @@ TEST(TexelLight, PartsThatReachIntoOneAnotherDoNotDarkenTheSeam) {
   };
   // Close to the floor both see half a hemisphere of it.
   EXPECT_NEAR(just_above(reaching) / just_above(whole), 1.0, 0.03);
-}
-
-TEST(LampView, TellsLightFromShadowOnAFloor) {
-  Mesh mesh;
-  add_plate(mesh, "grey", {-4, -4, 0}, {8, 0, 0}, {0, 8, 0});
-  add_plate(mesh, "grey", {-1, -1, 3}, {2, 0, 0}, {0, 2, 0});
-  LampView view(mesh);
-  WorkerPool pool(1);
-  view.update({0, 0, 1}, pool);
-  const auto at = [&](float x, float y) {
-    const Vector2f p = view.on_map({x, y, 0});
-    return view.places(x > y ? 0 : 1, p, p);
-  };
-  const auto on_small = [&] {
-    const Vector2f p = view.on_map({0.5F, 0.2F, 3});
-    return view.places(2, p, p);
-  };
-  EXPECT_EQ(on_small(), Lit::kYes);
-  EXPECT_EQ(at(3.0F, 1.0F), Lit::kYes);
-  EXPECT_EQ(at(1.0F, 3.0F), Lit::kYes);
-  EXPECT_EQ(at(0.5F, 0.2F), Lit::kNo);
-  EXPECT_EQ(at(1.0F, 0.2F), Lit::kUnknown);  // on the shadow's edge
-  // From below the small plate lies in the floor's shadow.
-  view.update({0, 0, -1}, pool);
-  EXPECT_EQ(at(0.5F, 0.2F), Lit::kYes);
-  EXPECT_EQ(on_small(), Lit::kNo);
-  view.update(Vector3d::Constant(std::nan("")), pool);
-  EXPECT_EQ(on_small(), Lit::kUnknown);
-  EXPECT_NE(at(3.0F, 1.0F), Lit::kYes);
 }
 
 }  // namespace
