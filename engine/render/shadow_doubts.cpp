@@ -11,8 +11,9 @@ constexpr std::array<int, kAskEvery> kAsks = {0, 2, 1, 3};
 constexpr bool asks_first(int x, int y) noexcept {
   return x % kAskEvery == kAsks[static_cast<std::size_t>(y % kAskEvery)];
 }
-// Of a cell's points of one facet: so few are asked at once.
-constexpr int kFewPoints = 6;
+// Of a cell's points of one facet: so few are asked at once. With 6 of them shadows are a third
+// noisier on a lattice of 4 by 4, for a tenth less time.
+constexpr int kFewPoints = 32;
 
 std::size_t at(int i) noexcept { return static_cast<std::size_t>(i); }
 

@@ -10,7 +10,8 @@
 namespace engine {
 
 /// Points of a row of a lattice whose lamps' own views cannot tell light from shadow there: rays
-/// ask. One point in four asks, of a few points all, and the others where these disagree.
+/// ask. Of up to 32 points of a facet in a cell all ask, of more one in four, and the others where
+/// these disagree.
 /// Thread: one at a time. Loop-safe but for the constructor. What it is given outlives it.
 class ShadowDoubts {
  public:
