@@ -37,9 +37,8 @@ LatticeRenderer::LatticeRenderer(const RenderSpec& spec, std::shared_ptr<TracedT
   const PixelRect all = spec.camera.frame().grown_by(spec.grid.beyond_frame_px);
   row_counts_.resize(at(all.height()));
   const int s = spec.grid.oversampling;
-  const int per_px = s * spec.lattice_side;
-  ENSURE(per_px <= TriangleRaster::kMostBandRows && at(s * s) <= kMostCells);
-  const std::size_t points = at(all.width() * per_px + TriangleRaster::kLanes) * at(per_px);
+  ENSURE(at(s * s) <= kMostCells);
+  const std::size_t points = LatticeView::most_points(spec);
   for (int i = 0; i < pool.threads(); ++i) {
     benches_.push_back(std::make_unique<Bench>(view_, *target_, points));
     Bench& bench = *benches_.back();
@@ -59,10 +58,8 @@ LatticeRenderer::Bench& LatticeRenderer::take_bench() noexcept {
 RenderReport LatticeRenderer::render(const Snapshot& snapshot, Budget budget,
                                      Radiance& out) noexcept {
   const int s = spec_.grid.oversampling;
-  int side = spec_.lattice_side;
-  while (side > 2 && budget.samples_per_pixel > 0 && side * side * s * s > budget.samples_per_pixel)
-    side /= 2;
-  if (!view_.place(snapshot, side)) return paths_.render(snapshot, budget, out);
+  if (!view_.place(snapshot, spec_.lattice_side, budget.samples_per_pixel))
+    return paths_.render(snapshot, budget, out);
 
   const PixelRect region = view_.region();
   out.region = region;
@@ -73,13 +70,14 @@ RenderReport LatticeRenderer::render(const Snapshot& snapshot, Budget budget,
   out.grid.resize(region.width() * s, region.height() * s);
   out.cover.resize(out.grid.width(), out.grid.height());
   RenderReport report;
-  report.samples_per_pixel = s * s * side * side;
+  report.samples_per_pixel = view_.points_a_pixel() * view_.points_a_pixel();
   report.bounces = spec_.bounces;
   report.visible_fraction = view_.footprint().visible_fraction();
+  constexpr double kNotKnown = std::numeric_limits<double>::quiet_NaN();
+  report.add({"method", "lattice", kNotKnown});
   report.add(
       bounces_rung(std::min(spec_.bounces, BouncedLight::kMostBounces), spec_.bounces_left_out_e));
   if (region.empty()) return report;
-  constexpr double kNotKnown = std::numeric_limits<double>::quiet_NaN();
   report.add({"sun disc", spec_.sun_disc == SunDisc::kOff ? "none" : "glints", kNotKnown});
   cap_ = !snapshot.earth.dark() && spec_.bounces > 0;
   // Harmonics stand for the cap; without bounces there are no texels for it.

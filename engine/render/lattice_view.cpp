@@ -1,5 +1,9 @@
 #include "engine/render/lattice_view.h"
 
+#include <algorithm>
+
+#include "engine/core/contract.h"
+
 namespace engine {
 namespace {
 
@@ -9,6 +13,10 @@ using Eigen::Vector3f;
 
 // The nearest a target may be, in its own radii from its centre.
 constexpr double kNearest = 2.0;
+
+// The flux of 800 points across a telescope is good to .1 % rms, of 400 to .3 %.
+constexpr int kAcross = 800;
+constexpr int kCoarse = 4;
 
 }  // namespace
 
@@ -21,11 +29,32 @@ LatticeView::LatticeView(const RenderSpec& spec, std::shared_ptr<const TracedTar
               spec.camera.frame().grown_by(spec.grid.beyond_frame_px).height()),
       corners_(target_->mesh.vertices.size()) {}
 
-bool LatticeView::place(const Snapshot& snapshot, int side) noexcept {
+std::size_t LatticeView::most_points(const RenderSpec& spec) noexcept {
+  const int wide = spec.camera.frame().grown_by(spec.grid.beyond_frame_px).width();
+  const int plain = spec.grid.oversampling * (spec.lattice_side > 0 ? spec.lattice_side : kCoarse);
+  ENSURE(plain <= TriangleRaster::kMostBandRows);
+  const auto points = [](int columns, int rows) {
+    return static_cast<std::size_t>(columns + TriangleRaster::kLanes) *
+           static_cast<std::size_t>(rows);
+  };
+  return std::max(points(wide * plain, plain), points(2 * kAcross, TriangleRaster::kMostBandRows));
+}
+
+int LatticeView::side_of(int wanted, int most) const noexcept {
+  const int s = oversampling_;
+  int side = wanted > 0 ? wanted : kCoarse;
+  const int across = s * std::max(region().width(), region().height());
+  while (wanted == 0 && across * side < kAcross && 2 * s * side <= TriangleRaster::kMostBandRows)
+    side *= 2;
+  while (side > 2 && most > 0 && s * s * side * side > most) side /= 2;
+  return side;
+}
+
+bool LatticeView::place(const Snapshot& snapshot, int side, int most) noexcept {
   footprint_.project(target_->mesh, snapshot);
   const PixelRect region = footprint_.region();
-  side_ = side;
-  points_a_pixel_ = oversampling_ * side;
+  side_ = side_of(side, most);
+  points_a_pixel_ = oversampling_ * side_;
   const double range_m = snapshot.camera.m.norm();
   // Not a number either.
   if (!(range_m > kNearest * target_->bounding_radius_m)) return false;

@@ -16,8 +16,12 @@ class LatticeView {
  public:
   LatticeView(const RenderSpec& spec, std::shared_ptr<const TracedTarget> target);
 
-  /// False: the view does not fit, see LatticeRenderer.
-  [[nodiscard]] bool place(const Snapshot& snapshot, int side) noexcept;
+  /// With so many points on the side of a cell; 0: 4, or more where the target is under 800 points
+  /// across. Fewer where there are more than `most` in a pixel, but for the last 2 by 2; most = 0
+  /// allows any number. False: the view does not fit, see LatticeRenderer.
+  [[nodiscard]] bool place(const Snapshot& snapshot, int side, int most) noexcept;
+  /// Of each buffer of see(), at most.
+  [[nodiscard]] static std::size_t most_points(const RenderSpec& spec) noexcept;
 
   [[nodiscard]] const Footprint& footprint() const noexcept { return footprint_; }
   [[nodiscard]] PixelRect region() const noexcept { return footprint_.region(); }
@@ -36,6 +40,8 @@ class LatticeView {
                                       Eigen::Vector3f& direction) const noexcept;
 
  private:
+  [[nodiscard]] int side_of(int wanted, int most) const noexcept;
+
   CameraGeometry camera_;
   int oversampling_;
   std::shared_ptr<const TracedTarget> target_;

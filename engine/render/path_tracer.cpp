@@ -84,6 +84,7 @@ RenderReport PathTracer::render(const Snapshot& snapshot, Budget budget, Radianc
   size_images(out);
 
   report.bounces = bounced_[0].bounces();
+  report.add({"method", "paths", std::numeric_limits<double>::quiet_NaN()});
   report.add(bounces_rung(report.bounces, spec_.bounces_left_out_e));
   if (out.region.empty()) return report;
   if (!goes_on) light_up(snapshot, report);

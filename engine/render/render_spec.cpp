@@ -1,5 +1,6 @@
 #include "engine/render/render_spec.h"
 
+#include <optional>
 #include <utility>
 
 #include "engine/core/contract.h"
@@ -23,9 +24,15 @@ bool is_auto(const ConfigTable& table, const std::string& key) {
 
 RenderSpec read_render(const ConfigTable& table) {
   RenderSpec spec;
-  spec.method = table.choice_or<RenderMethod>(
-      "method", "paths", {{"lattice", RenderMethod::kLattice}, {"paths", RenderMethod::kPaths}});
-  spec.lattice_side = table.choice_or<int>("lattice", "8x8", {{"8x8", 8}, {"4x4", 4}, {"2x2", 2}});
+  const auto method =
+      table.choice_or<std::optional<RenderMethod>>("method", "auto",
+                                                   {{"auto", std::nullopt},
+                                                    {"lattice", RenderMethod::kLattice},
+                                                    {"paths", RenderMethod::kPaths}});
+  spec.method = method.value_or(RenderMethod::kLattice);
+  spec.method_by_need = !method.has_value();
+  spec.lattice_side =
+      table.choice_or<int>("lattice", "auto", {{"auto", 0}, {"8x8", 8}, {"4x4", 4}, {"2x2", 2}});
   spec.profile = table.choice_or<RenderProfile>(
       "profile", "default",
       {{"default", {0.3, 0.19}}, {"reference", {0.1, 0.063}}, {"preview", {1.0, 0.63}}});

@@ -48,7 +48,9 @@ struct RenderProfile {
 
 struct RenderSpec {
   RenderMethod method = RenderMethod::kPaths;
-  int lattice_side = 8;  ///< lattice: points on a side of a cell: 2, 4 or 8
+  bool method_by_need = false;  ///< kLattice, unless the scenario has what it does not know
+  int lattice_side = 0;  ///< lattice: points on a side of a cell: 2, 4 or 8; 0: 4, and more for
+                         ///< targets that are small on the detector
   /// Lattice: what is kept on the body is complete in each frame, whatever that takes.
   bool settled = false;
   RenderProfile profile;

@@ -12,9 +12,10 @@ namespace {
 
 constexpr std::int32_t kStep = TriangleRaster::kStep;
 constexpr auto& kPlaceInStep = TriangleRaster::kPlaceInStep;
-// Corners within this many sixteenths: what an edge changes by over kLanes steps and kMostBandRows
-// rows stays below 2^30.
+// Corners within this many sixteenths: what an edge changes by over kLanes steps and 32 rows stays
+// below 2^30. Bands of more rows take half of it.
 constexpr double kLimit = 1 << 19;
+constexpr int kManyRows = 32;
 constexpr std::int64_t kFar = 1 << 30;
 
 struct EdgeFunction {
@@ -137,8 +138,9 @@ TriangleRaster::TriangleRaster(std::size_t vertices, std::size_t triangles, int 
 bool TriangleRaster::place(const Mesh& mesh, std::span<const Corner> corners, int columns, int rows,
                            int band_rows) noexcept {
   ENSURE(band_rows > 0 && band_rows <= kMostBandRows && columns >= 0 && rows >= 0);
+  const double limit = band_rows > kManyRows ? 0.5 * kLimit : kLimit;
   for (const Corner& c : corners) {
-    if (!(std::abs(c.x) * kStep < kLimit && std::abs(c.y) * kStep < kLimit)) return false;
+    if (!(std::abs(c.x) * kStep < limit && std::abs(c.y) * kStep < limit)) return false;
   }
   mesh_ = &mesh;
   for (std::size_t i = 0; i < corners.size(); ++i) {

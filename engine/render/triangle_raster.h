@@ -29,7 +29,7 @@ class TriangleRaster {
   /// Bit reversal of 0..7, at the middle of eighths, in sixteenths.
   static constexpr std::array<std::int32_t, kPeriod> kPlaceInStep = {1, 9, 5, 13, 3, 11, 7, 15};
   static constexpr int kLanes = 16;
-  static constexpr int kMostBandRows = 32;
+  static constexpr int kMostBandRows = 64;
 
   struct Corner {
     double x = 0;  ///< in steps from the left edge of the first column

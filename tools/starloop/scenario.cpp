@@ -82,6 +82,11 @@ Duration read_deadline(const ConfigTable& table, const RunSpec& run, engine::Ren
   return deadline;
 }
 
+// What the lattice does not know: other bodies, and stopping half-way.
+bool wants_paths(const ConfigTable& render, const Scenario& s) {
+  return !s.companions.empty() || (render.has("deadline_ms") && !render.is_text("deadline_ms"));
+}
+
 void read_record(const ConfigTable& table, RunSpec& run) {
   run.record_frames = table.choice_or<RecordFrames>("frames", "png",
                                                     {{"none", RecordFrames::kNone},
@@ -225,6 +230,8 @@ Scenario read_scenario(const ConfigReader& config) {
   s.materials = engine::read_materials(config);
   s.optics = engine::read_optics(config.table("optics"), s.scene.camera);
   s.render = engine::read_render(config.table("render"));
+  if (s.render.method_by_need && wants_paths(config.table("render"), s))
+    s.render.method = engine::RenderMethod::kPaths;
   s.run.render_time = read_deadline(config.table("render"), s.run, s.render.method);
   s.render.camera = s.scene.camera;
   if (!s.companions.empty() && s.render.method != engine::RenderMethod::kPaths)

@@ -27,6 +27,7 @@ const Vector3d kUp(0, 1, 0);
 RenderSpec spec_of(int side_px, int bounces = 0) {
   RenderSpec spec;
   spec.method = RenderMethod::kLattice;
+  spec.lattice_side = 8;
   spec.bounces = bounces;
   spec.camera = small_camera(side_px);
   spec.grid.beyond_frame_px = 16;
@@ -362,6 +363,7 @@ TEST(LatticeRenderer, SaysWhichRungsItTook) {
       if (rung.ladder == ladder) return rung;
     return Rung{};
   };
+  EXPECT_EQ(taken("method").taken, "lattice");
   EXPECT_EQ(taken("bounces").taken, "2");
   EXPECT_EQ(taken("bounces").error_e, 3.5);
   EXPECT_EQ(taken("sun disc").taken, "glints");
@@ -378,6 +380,24 @@ TEST(LatticeRenderer, TakesTheFinestLatticeThatABudgetAllows) {
   EXPECT_EQ(rig.report.samples_per_pixel, 144);
   (void)rig.render(snapshot, {1});
   EXPECT_EQ(rig.report.samples_per_pixel, 36);
+}
+
+TEST(LatticeRenderer, IsFinerForWhatIsSmallUnlessASideIsAskedFor) {
+  RenderSpec spec = spec_of(200);
+  spec.lattice_side = 0;
+  const auto points = [&](double size_px, Budget budget = {}) {
+    Rig rig(spec, plate(), {lambert_material("white", 0.3)});
+    const double range_m = 6.0 / size_px / spec.camera.ifov_rad();
+    (void)rig.render(view_from({0, 0, range_m}, {0, 0, 1}), budget);
+    return rig.report.samples_per_pixel;
+  };
+  EXPECT_EQ(points(100.0), 12 * 12);
+  EXPECT_EQ(points(50.0), 24 * 24);
+  EXPECT_EQ(points(25.0), 48 * 48);
+  EXPECT_EQ(points(3.0), 48 * 48);
+  EXPECT_EQ(points(3.0, {200}), 12 * 12);
+  spec.lattice_side = 2;
+  EXPECT_EQ(points(3.0), 6 * 6);
 }
 
 TEST(LatticeRenderer, LeavesWhatIsTooNearToThePathTracer) {

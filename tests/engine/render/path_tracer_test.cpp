@@ -195,18 +195,20 @@ TEST(PathTracer, SaysWhichRungsItTook) {
   RenderSpec spec = spec_of(64, 2);
   spec.bounces_left_out_e = 12.5;
   const Rendered near = render(spec, plate(), {lambert_material("white", 0.3)}, above(0.0));
-  EXPECT_EQ(near.report.rungs[0].ladder, "bounces");
-  EXPECT_EQ(near.report.rungs[0].taken, "2");
-  EXPECT_EQ(near.report.rungs[0].error_e, 12.5);
-  EXPECT_EQ(near.report.rungs[1].ladder, "sun disc");
-  EXPECT_EQ(near.report.rungs[1].taken, "glints and shadows");
+  EXPECT_EQ(near.report.rungs[0].ladder, "method");
+  EXPECT_EQ(near.report.rungs[0].taken, "paths");
+  EXPECT_EQ(near.report.rungs[1].ladder, "bounces");
+  EXPECT_EQ(near.report.rungs[1].taken, "2");
+  EXPECT_EQ(near.report.rungs[1].error_e, 12.5);
+  EXPECT_EQ(near.report.rungs[2].ladder, "sun disc");
+  EXPECT_EQ(near.report.rungs[2].taken, "glints and shadows");
   // A target of 8 m throws edges of 8 cm at most: a fifth of a pixel at 270 km.
   Snapshot far = look_at_origin({0, 0, 400e3}, kUp);
   far.sun = above(0.0).sun;
-  EXPECT_EQ(render(spec, plate(), {lambert_material("white", 0.3)}, far).report.rungs[1].taken,
+  EXPECT_EQ(render(spec, plate(), {lambert_material("white", 0.3)}, far).report.rungs[2].taken,
             "glints");
   spec.sun_disc = SunDisc::kOff;
-  EXPECT_EQ(render(spec, plate(), {lambert_material("white", 0.3)}, far).report.rungs[1].taken,
+  EXPECT_EQ(render(spec, plate(), {lambert_material("white", 0.3)}, far).report.rungs[2].taken,
             "none");
 }
 
