@@ -29,6 +29,7 @@ void LatticeNoise::start(const PixelRect& region, int points_a_pixel_side, doubl
   points_ = static_cast<float>(n * n);
   edge_share_ = static_cast<float>(kEdge / (n * n * n));
   // Of a camera that is not known: infinite, or not a number.
+  kept_ = static_cast<float>(map_.kept_variance());
   const double scale = limit * limit / (map_.kept_variance() * noise_.e_per_radiance);
   limit_dark_ = static_cast<float>(scale * noise_.dark_variance_e2 / noise_.e_per_radiance);
   limit_lit_ = static_cast<float>(scale);

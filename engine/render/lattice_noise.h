@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <span>
 #include <vector>
 
@@ -36,6 +37,11 @@ class LatticeNoise {
                                float parts) const noexcept {
     return noise_w_m2_sr * noise_w_m2_sr > parts * (limit_dark_ + limit_lit_ * light_w_m2_sr);
   }
+  /// Cells of `parts` a pixel with the same noise: how many times their variance is worth that of
+  /// noise of their own, which the optics average over.
+  [[nodiscard]] float alike(float cells, int parts) const noexcept {
+    return std::clamp(cells, 1.0F, static_cast<float>(parts) / kept_);
+  }
   /// Pixel `index` of the region, row by row, has this mean.
   void set(std::size_t index, float mean_w_m2_sr, const Tally& tally) noexcept;
   [[nodiscard]] NoiseReached reached() noexcept;
@@ -44,6 +50,7 @@ class LatticeNoise {
   NoiseMap map_;
   SensorNoise noise_;
   PixelRect region_;
+  float kept_ = 1;  ///< of a pixel's variance, by the optics
   float points_ = 1;
   float edge_share_ = 0;  ///< of the variance between tones
   // Variance of a pixel that is at the limit: at no light, and more for each W/m^2/sr.

@@ -99,7 +99,7 @@ RenderReport LatticeRenderer::render(const Snapshot& snapshot, Budget budget,
     const auto cell_m = static_cast<float>(px_m / s);
     const auto update = [&] {
       const bool again = texels_.update(snapshot, lamp, px_m, spec_.settled, pool_);
-      const float across = std::max(1.0F, texels_.texel_m() / cell_m);
+      const float across = texels_.texel_m() / cell_m;
       cells_alike_ = across * across;
       const RayCounts counts = texels_.rays();
       report.rays += counts.rays;
@@ -254,7 +254,6 @@ void LatticeRenderer::add_kept(const Row& row, int column, const Tone& tone,
   const float other = both ? kept_by_patch(1, middle) : 0.0F;
   const auto all = static_cast<float>(view_.points_a_pixel() * view_.points_a_pixel());
   float variance = 0.0F;
-  const float independent = static_cast<float>(s * s) / cells_alike_;
   const auto& lamps = target_->facets.radiance(tone.facet);
   const float brightest = std::max(lamps[0], lamps[1]);
   if (std::exchange(row.bench.last_material, middle.material) != middle.material)
@@ -268,16 +267,17 @@ void LatticeRenderer::add_kept(const Row& row, int column, const Tone& tone,
     const TexelLight::Light kept = texels_.at(tone.facet, side, place.x(), place.y());
     light[cell] = other + (std::isnan(kept.w_m2_sr) ? without_texel(row, middle) : kept.w_m2_sr);
     const float noise = points / all * kept.noise_w_m2_sr;
-    variance += noise * noise;
+    const float alike = noise_.alike(cells_alike_ * kept.averaged, s * s);
+    variance += alike * noise * noise;
     if (kept.kept == TexelLight::kNone || kept.kept == last.kept) continue;
     // By the texel before of the same stuff.
     const auto sets = static_cast<float>(kept.sets);
-    if (last.sets > 0 &&
-        noise_.too_noisy(last.noise_of_one, brightest + light[cell], sets * independent))
+    if (last.sets > 0 && noise_.too_noisy(last.noise_of_one, brightest + light[cell],
+                                          sets * static_cast<float>(s * s) / alike))
       texels_.want_more(kept);
     last = kept;
   }
-  row.bench.tallies[at(column)].variance += cells_alike_ * variance;
+  row.bench.tallies[at(column)].variance += variance;
 }
 
 float LatticeRenderer::kept_by_patch(std::size_t lamp, const SurfacePoint& place) const noexcept {

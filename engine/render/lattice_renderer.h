@@ -124,7 +124,7 @@ class LatticeRenderer final : public Renderer {
   std::array<Eigen::Vector3f, kLamps> toward_lamp_;
   std::size_t texel_lamp_ = 0;  ///< the brighter one
   bool cap_ = false;            ///< the Earth's light is its cap's, kept by texels
-  float cells_alike_ = 1;       ///< so many share what a texel has wrong
+  float cells_alike_ = 1;       ///< so many see the same texel
 };
 
 }  // namespace engine

@@ -17,8 +17,9 @@ class LatticeView {
   LatticeView(const RenderSpec& spec, std::shared_ptr<const TracedTarget> target);
 
   /// With so many points on the side of a cell; 0: 4, or more where the target is under 800 points
-  /// across. Fewer where there are more than `most` in a pixel, but for the last 2 by 2; most = 0
-  /// allows any number. False: the view does not fit, see LatticeRenderer.
+  /// across, or 2 where it is over 5400. Fewer where there are more than `most` in a pixel, but for
+  /// the last 2 by 2; most = 0 allows any number. False: the view does not fit, see
+  /// LatticeRenderer.
   [[nodiscard]] bool place(const Snapshot& snapshot, int side, int most) noexcept;
   /// Of each buffer of see(), at most.
   [[nodiscard]] static std::size_t most_points(const RenderSpec& spec) noexcept;

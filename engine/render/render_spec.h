@@ -49,8 +49,8 @@ struct RenderProfile {
 struct RenderSpec {
   RenderMethod method = RenderMethod::kPaths;
   bool method_by_need = false;  ///< kLattice, unless the scenario has what it does not know
-  int lattice_side = 0;  ///< lattice: points on a side of a cell: 2, 4 or 8; 0: 4, and more for
-                         ///< targets that are small on the detector
+  int lattice_side = 0;         ///< lattice: points on a side of a cell: 2, 4 or 8; 0: 4, more for
+                                ///< targets that are small on the detector and fewer for large ones
   /// Lattice: what is kept on the body is complete in each frame, whatever that takes.
   bool settled = false;
   RenderProfile profile;

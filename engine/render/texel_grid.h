@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -39,6 +40,11 @@ class TexelGrid {
     std::array<float, 2> span{};  ///< of these
   };
   [[nodiscard]] Texel texel(std::uint32_t number) const noexcept;
+  /// Calls `use` with the numbers of all texels of the same side whose middles lie within `reach_m`
+  /// of this one's, and no more than four texels away, and their squared distances; its own among
+  /// them.
+  template <typename Use>
+  void each_near(std::uint32_t number, const Texel& texel, float reach_m, Use use) const noexcept;
   /// A place in it; `a` and `b` in [0, 1]. On the facet's edge where the texel reaches beyond.
   [[nodiscard]] SurfacePoint place(const Texel& texel, float a, float b) const noexcept;
 
@@ -57,6 +63,7 @@ class TexelGrid {
     /// Weights of the second and the third corner.
     [[nodiscard]] std::array<float, 2> weights(float along, float up) const noexcept;
   };
+  static constexpr float kMostNear = 4.0F;  ///< texels
   struct Side {
     std::uint32_t first = 0;
     std::uint16_t along = 1;
@@ -76,5 +83,29 @@ class TexelGrid {
   std::size_t most_texels_;
   std::uint32_t texels_ = 0;
 };
+
+template <typename Use>
+void TexelGrid::each_near(std::uint32_t number, const Texel& texel, float reach_m,
+                          Use use) const noexcept {
+  const Side& s = sides_[2 * std::size_t{texel.facet} + texel.side];
+  const float along_m = frames_[texel.facet].edge_m * texel.span[0];
+  const float up_m = frames_[texel.facet].height_m * texel.span[1];
+  const auto along = static_cast<int>((number - s.first) / s.up);
+  const auto up = static_cast<int>((number - s.first) % s.up);
+  const auto steps = [](float reach, float step) {
+    return reach > 0.0F ? static_cast<int>(std::min(reach / step, kMostNear)) : 0;
+  };
+  const int wide = steps(reach_m, along_m);
+  for (int i = std::max(along - wide, 0); i <= std::min(along + wide, s.along - 1); ++i) {
+    const float beside_m = static_cast<float>(i - along) * along_m;
+    const int high =
+        steps(std::sqrt(std::max(reach_m * reach_m - beside_m * beside_m, 0.0F)), up_m);
+    for (int j = std::max(up - high, 0); j <= std::min(up + high, s.up - 1); ++j) {
+      const float above_m = static_cast<float>(j - up) * up_m;
+      use(s.first + static_cast<std::uint32_t>(i) * s.up + static_cast<std::uint32_t>(j),
+          beside_m * beside_m + above_m * above_m);
+    }
+  }
+}
 
 }  // namespace engine

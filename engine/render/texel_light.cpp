@@ -27,6 +27,8 @@ constexpr std::uint32_t kNumberBits = 28;
 constexpr float kMostTurned_rad = 8e-3F;
 constexpr std::uint32_t kSumEvery = 4;
 constexpr std::uint32_t kSumEvenEvery = 16;
+// Of 8 rays over the distance that they went, and less for more.
+constexpr float kReachOfOne = 8.0F * 0.15F;
 
 /// The bins in an order of which each is near the one before: along a Z through each four (Morton).
 constexpr std::array<std::uint8_t, HemisphereBins::kBins> kNeighbours = [] {
@@ -63,6 +65,7 @@ TexelLight::TexelLight(const TracedTarget& target, const BodyLight& body_light, 
   states_.reserve(TexelRays::kMostSets);
   own_.reserve(TexelRays::kMostSets);
   values_.reserve(TexelRays::kMostSets);
+  shown_.reserve(TexelRays::kMostSets);
   wanted_.reserve(TexelRays::kMostSets);
   toward_lamp_.fill(Vector3f::Zero());
 }
@@ -74,6 +77,7 @@ void TexelLight::start_over(float texel_m) noexcept {
   states_.clear();
   own_.clear();
   values_.clear();
+  shown_.clear();
   wanted_.clear();
   refine_from_ = 0;
   std::fill_n(first_of_.begin(), grid_.texels(), kNone);
@@ -107,6 +111,7 @@ void TexelLight::keep(const TexelGrid::Texel& texel, std::uint32_t number) noexc
   states_.push_back({.lit_in = frame_, .even = body_light_.binned(material).even()});
   own_.push_back({});
   values_.push_back({});
+  shown_.push_back({});
   wanted_.push_back(0);
 }
 
@@ -184,6 +189,7 @@ bool TexelLight::update(const Snapshot& snapshot, const LampInView& lamp, double
   each_share(
       [&](std::size_t first, std::size_t end) { tend(first, end, snapshot, lamp, all_rays); });
   each_share([&](std::size_t first, std::size_t end) { combine(first, end); });
+  each_share([&](std::size_t first, std::size_t end) { smooth(first, end, all_rays); });
   counts_ = rays_.take_counts();
   return !had_room || (all_rays && n > before);
 }
@@ -214,7 +220,8 @@ void TexelLight::renew(std::size_t k, bool changed, const Snapshot& snapshot,
     rays_.ask_lamp(k, lamp.view, toward_lamp_[frame_ % kTurns], sent_);
     changed = true;
   }
-  if (!changed && phase % (state.even ? kSumEvenEvery : kSumEvery) != 0) return;
+  state.summed = changed || phase % (state.even ? kSumEvenEvery : kSumEvery) == 0;
+  if (!state.summed) return;
   weigh(rays_.set(k).texel, snapshot, reflection);
   own_[k].of_lamp = of_lamp(k, reflection);
   own_[k].of_earth_w_m2_sr = of_earth(k, reflection);
@@ -227,6 +234,8 @@ void TexelLight::combine(std::size_t first, std::size_t end) noexcept {
     if (!states_[k].first) continue;
     values_[k] = own_[k];
     values_[k].noise_of_one = own_[k].noise;
+    values_[k].rays = static_cast<float>(rays_.progress(k).sent);
+    values_[k].reach_m = kReachOfOne * rays_.distance_m(k) / values_[k].rays;
     if (states_[k].next == kNone) continue;
     float rays = 0.0F;
     Value sum{.sets = 0};
@@ -241,8 +250,49 @@ void TexelLight::combine(std::size_t first, std::size_t end) noexcept {
       sum.noise += noise * noise;
       sum.noise_of_one += noise;
     }
-    values_[k] = {sum.of_lamp / rays, std::sqrt(sum.noise) / rays, sum.of_earth_w_m2_sr / rays,
-                  sum.noise_of_one / rays, sum.sets};
+    values_[k] = {.of_lamp = sum.of_lamp / rays,
+                  .noise = std::sqrt(sum.noise) / rays,
+                  .of_earth_w_m2_sr = sum.of_earth_w_m2_sr / rays,
+                  .noise_of_one = sum.noise_of_one / rays,
+                  .sets = sum.sets,
+                  .rays = rays,
+                  .reach_m = kReachOfOne * rays_.distance_m(k) / rays};
+  }
+}
+
+/// Of those that were summed up, by their rays.
+void TexelLight::smooth(std::size_t first, std::size_t end, bool all) noexcept {
+  for (std::size_t k = first; k < end; ++k) {
+    if (!states_[k].first || !(states_[k].summed || all)) continue;
+    const Value& own = values_[k];
+    shown_[k] = own;
+    // Texels of a side stand no closer than half the width that was asked for.
+    if (!(own.reach_m > 0.5F * texel_m_)) continue;
+    Value sum{.rays = 0};
+    float squares = 0.0F;
+    const auto add = [&](std::uint32_t texel, float distance2_m2) {
+      const std::uint32_t near = first_of_[texel];
+      if (near == kNone) return;
+      const Value& value = values_[near];
+      // Near to both: what is bright close to a corner would else be added where it is not, and
+      // stay where it is. A reach that is no number has no rays either.
+      if (!(distance2_m2 <= value.reach_m * value.reach_m)) return;
+      const float weight = value.rays;
+      sum.rays += weight;
+      squares += weight * weight;
+      sum.of_lamp += weight * value.of_lamp;
+      sum.of_earth_w_m2_sr += weight * value.of_earth_w_m2_sr;
+      sum.noise += weight * weight * value.noise * value.noise;
+      sum.noise_of_one += weight * weight * value.noise_of_one * value.noise_of_one;
+    };
+    const TexelRays::Set& set = rays_.set(k);
+    grid_.each_near(set.number, set.texel, own.reach_m, add);
+    shown_[k] = {.of_lamp = sum.of_lamp / sum.rays,
+                 .noise = std::sqrt(sum.noise) / sum.rays,
+                 .of_earth_w_m2_sr = sum.of_earth_w_m2_sr / sum.rays,
+                 .noise_of_one = std::sqrt(sum.noise_of_one) / sum.rays,
+                 .sets = own.sets,
+                 .averaged = sum.rays * sum.rays / squares};
   }
 }
 

@@ -185,6 +185,9 @@ void TexelRays::follow(const RayPacket& packet,
     const SurfacePoint hit = target_.facets.at(hits[l], d);
     const SurfacePoint front = target_.facets.on_side(hits[l].triangle, 0, 0, 0);
     set.sides[bin] = 2 * hits[l].triangle + (hit.normal.dot(front.normal) > 0.0F ? 0U : 1U);
+    const Vector3f from(packet.origin_x[l], packet.origin_y[l], packet.origin_z[l]);
+    // Parts that touch are no nearer than the rays' own start.
+    set.crowding_per_m += 1.0F / std::max((hit.place - from).norm(), hit.offset_m);
     set.weights[bin] = {rounded(hits[l].second), rounded(hits[l].third)};
     if (patches_ != nullptr) met_[k][bin] = patches_->at(hit);
   }

@@ -36,6 +36,7 @@ class TexelRays {
     static constexpr std::size_t kStarts = 4;
     std::array<std::array<float, 2>, kStarts> starts{};  ///< places in the texel
     std::uint32_t starts_known = 0;
+    float crowding_per_m = 0;  ///< sum over the rays of 1 / distance, of the sky none
   };
   /// Apart from the sets, for it is looked at in each frame.
   struct Progress {
@@ -62,6 +63,10 @@ class TexelRays {
   [[nodiscard]] const Set& set(std::size_t k) const noexcept { return sets_[k]; }
   [[nodiscard]] Progress& progress(std::size_t k) noexcept { return progress_[k]; }
   [[nodiscard]] const Progress& progress(std::size_t k) const noexcept { return progress_[k]; }
+  /// Harmonic mean of the distances that its rays went; infinite where all see the sky.
+  [[nodiscard]] float distance_m(std::size_t k) const noexcept {
+    return static_cast<float>(progress_[k].sent) / sets_[k].crowding_per_m;
+  }
   /// Pre: there are patches.
   [[nodiscard]] std::uint32_t patch_met(std::size_t k, std::size_t bin) const noexcept {
     return met_[k][bin];

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -191,6 +193,48 @@ TEST(TexelGrid, EveryPlaceOfAFacetHasATexelRoundIt) {
   }
 }
 
+TEST(TexelGrid, FindsWhatIsNear) {
+  const TracedTarget target(corner(), {lambert_material("grey", 0.5)});
+  TexelGrid grid(target);
+  grid.cut(0.5F);
+  const auto middle = [&](std::uint32_t number) {
+    // Of the texel's own square, which may reach beyond the facet.
+    const TexelGrid::Texel t = grid.texel(number);
+    return Vector2f(t.low[0] + 0.5F * t.span[0], t.low[1] + 0.5F * t.span[1]);
+  };
+  // The floor: 14.42 m along its diagonal, 6.66 m up.
+  const Vector2f size(std::hypot(8.0F, 12.0F), 96.0F / std::hypot(8.0F, 12.0F));
+  for (const float reach_m : {0.0F, 0.3F, 0.75F, 1.6F}) {
+    for (std::uint32_t number = 0; number < grid.texels(); number += 7) {
+      const TexelGrid::Texel texel = grid.texel(number);
+      if (texel.facet > 1) continue;
+      std::vector<std::uint32_t> found;
+      grid.each_near(number, texel, reach_m, [&](std::uint32_t near, float distance2_m2) {
+        found.push_back(near);
+        const float apart_m = (middle(near) - middle(number)).cwiseProduct(size).norm();
+        EXPECT_NEAR(std::sqrt(distance2_m2), apart_m, 1e-3F);
+      });
+      std::vector<std::uint32_t> wanted;
+      for (std::uint32_t other = 0; other < grid.texels(); ++other) {
+        const TexelGrid::Texel t = grid.texel(other);
+        if (t.facet == texel.facet && t.side == texel.side &&
+            (middle(other) - middle(number)).cwiseProduct(size).norm() <= reach_m)
+          wanted.push_back(other);
+      }
+      EXPECT_EQ(found, wanted);
+    }
+  }
+  // No more than four away, whatever is asked; of what is no number itself alone.
+  int many = 0;
+  const TexelGrid::Texel texel = grid.texel(100);
+  const auto count = [&](std::uint32_t /*number*/, float /*distance2_m2*/) { ++many; };
+  grid.each_near(100, texel, std::numeric_limits<float>::infinity(), count);
+  EXPECT_LE(many, 81);
+  many = 0;
+  grid.each_near(100, texel, std::nanf(""), count);
+  EXPECT_EQ(many, 1);
+}
+
 TEST(TexelGrid, CutsNoFinerThanThereIsRoomFor) {
   const TracedTarget target(corner(), {lambert_material("grey", 0.5)});
   TexelGrid grid(target);
@@ -249,6 +293,43 @@ TEST(TexelLight, WallIsLitByTheFloorAsItsFormFactorSaysToTheCorner) {
     // chance has it, and leaves .7 % of what a floor all round would send.
     EXPECT_NEAR((sum - want) / (0.5 * leaving), 0.0, 0.02) << h;
   }
+}
+
+TEST(TexelLight, FirstRaysOfNeighboursStandForEachOther) {
+  // On the wall 1.5 m up, with eight rays a texel: some alone, some among all their neighbours.
+  const Snapshot snapshot = before_the_wall();
+  struct Spread {
+    double mean = 0;
+    double rms = 0;
+  };
+  const auto ask = [&](bool neighbours) {
+    Texels texels(corner(), snapshot);
+    std::vector<Vector2f> places;
+    for (float y = -5.0F; y < 2.0F; y += 0.5F) {
+      const float third = 1.5F / 6.0F;
+      places.emplace_back((y + 6.0F) / 12.0F - third, third);
+    }
+    const auto light = [&](const Vector2f& p) {
+      return static_cast<double>(texels.light.at(2, 0, p.x(), p.y()).w_m2_sr);
+    };
+    for (const Vector2f& p : places) {
+      (void)light(p);
+      for (float dx = -0.02F; neighbours && dx < 0.02F; dx += 1e-3F)
+        for (float dy = -0.04F; dy < 0.04F; dy += 2e-3F) (void)light(p + Vector2f(dx, dy));
+    }
+    texels.light.update(snapshot, {0, texels.view}, Texels::kPx_m, false, texels.pool);
+    Spread spread;
+    const auto n = static_cast<double>(places.size());
+    for (const Vector2f& p : places) spread.mean += light(p) / n;
+    for (const Vector2f& p : places) spread.rms += std::pow(light(p) - spread.mean, 2) / n;
+    spread.rms = std::sqrt(spread.rms);
+    return spread;
+  };
+  const Spread alone = ask(false);
+  const Spread among = ask(true);
+  EXPECT_LT(among.rms, 0.5 * alone.rms);
+  const double want = 0.5 * 0.5 * 634.64 / kPi * wall_to_floor(1.5);
+  EXPECT_NEAR(among.mean / want, 1.0, 0.03);
 }
 
 TEST(TexelLight, MoreTexelsThanThereIsRoomForAreMadeCoarser) {

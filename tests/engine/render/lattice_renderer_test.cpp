@@ -383,7 +383,7 @@ TEST(LatticeRenderer, TakesTheFinestLatticeThatABudgetAllows) {
 }
 
 TEST(LatticeRenderer, IsFinerForWhatIsSmallUnlessASideIsAskedFor) {
-  RenderSpec spec = spec_of(200);
+  RenderSpec spec = spec_of(520);
   spec.lattice_side = 0;
   const auto points = [&](double size_px, Budget budget = {}) {
     Rig rig(spec, plate(), {lambert_material("white", 0.3)});
@@ -391,6 +391,7 @@ TEST(LatticeRenderer, IsFinerForWhatIsSmallUnlessASideIsAskedFor) {
     (void)rig.render(view_from({0, 0, range_m}, {0, 0, 1}), budget);
     return rig.report.samples_per_pixel;
   };
+  EXPECT_EQ(points(500.0), 6 * 6);
   EXPECT_EQ(points(100.0), 12 * 12);
   EXPECT_EQ(points(50.0), 24 * 24);
   EXPECT_EQ(points(25.0), 48 * 48);
