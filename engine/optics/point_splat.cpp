@@ -91,7 +91,8 @@ void PointSplat::fill_tables(const OpticsSpec& spec) {
   const Eigen::MatrixXd image =
       image_of_a_point(BandOtf(spec.band), spec.camera.pixel_pitch_m, places, 1.0 / kPhases);
   peak_share_ = image(0, 0);
-  tables_.resize(static_cast<std::size_t>(kTables * kTables * side * stride_));
+  const int shares = kTables * kTables * side * stride_;
+  tables_.resize(static_cast<std::size_t>(shares));
   std::size_t at = 0;
   // Phase 1 + kPhases / 2 is no displacement. A point to the right of a pixel's centre shows to the
   // pixel as a displacement to the left.

@@ -20,8 +20,10 @@ std::size_t at(int i) noexcept { return static_cast<std::size_t>(i); }
 }  // namespace
 
 Vector3f HemisphereBins::direction(std::size_t bin, float a, float b) noexcept {
-  const auto x = 2.0F * (static_cast<float>(bin % kSide) + a) / kSide - 1.0F;
-  const auto y = 2.0F * (static_cast<float>(bin / kSide) + b) / kSide - 1.0F;
+  const std::size_t column = bin % kSide;
+  const std::size_t row = bin / kSide;
+  const auto x = 2.0F * (static_cast<float>(column) + a) / kSide - 1.0F;
+  const auto y = 2.0F * (static_cast<float>(row) + b) / kSide - 1.0F;
   constexpr auto kQuarter = static_cast<float>(kPi / 4.0);
   float r = 0.0F;
   float phi = 0.0F;
@@ -83,8 +85,10 @@ void BinnedBrdf::tabulate(const Brdf& brdf) {
       for (std::size_t bin = 0; bin < HemisphereBins::kBins; ++bin) {
         double mean = 0;
         for (int p = 0; p < kStepsInBin * kStepsInBin; ++p) {
-          const float a = (static_cast<float>(p % kStepsInBin) + 0.5F) / kStepsInBin;
-          const float b = (static_cast<float>(p / kStepsInBin) + 0.5F) / kStepsInBin;
+          const int along = p % kStepsInBin;
+          const int up = p / kStepsInBin;
+          const float a = (static_cast<float>(along) + 0.5F) / kStepsInBin;
+          const float b = (static_cast<float>(up) + 0.5F) / kStepsInBin;
           const Vector3f in = HemisphereBins::direction(bin, a, b);
           // A bin holds pi/64 of the integral over the hemisphere by the cosine.
           const double share = brdf.eval(in.cast<double>(), out) * kPi /

@@ -215,7 +215,7 @@ void PathTracer::pilot_row(const Snapshot& snapshot, const PixelRect& region, in
     static_cast<void>(draws.block());  // the image's
     const auto keys = draws.block();
     tracer.trace(u - span.begin, {1.0 * u, 1.0 * v}, keys, 0, kPilotEach);
-    row_counts_[at(row)].samples += kPilotReplicates * kPilotEach;
+    row_counts_[at(row)].samples += static_cast<std::uint64_t>(kPilotReplicates) * kPilotEach;
   }
   tracer.finish();
   for (int u = span.begin; u < span.end; ++u) {

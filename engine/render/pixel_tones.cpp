@@ -8,7 +8,8 @@ std::size_t at(int i) noexcept { return static_cast<std::size_t>(i); }
 }  // namespace
 
 PixelTones::PixelTones(const LatticeView& view) : view_(view) {
-  tones_.reserve(TriangleRaster::kMostBandRows * TriangleRaster::kMostBandRows);
+  constexpr std::size_t kMostPoints = TriangleRaster::kMostBandRows;
+  tones_.reserve(kMostPoints * kMostPoints);
 }
 
 std::span<const PixelTones::Tone> PixelTones::find(std::span<const std::uint32_t> seen,

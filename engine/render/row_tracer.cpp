@@ -78,7 +78,8 @@ void RowTracer::trace(int column, PixelPoint pixel, std::span<const std::uint32_
         q.place_key[lane] = place_key;
         q.place[lane] = static_cast<std::uint32_t>(i);
         q.cell_u[lane] = static_cast<float>((pixel.u - 0.5 - q.corner.u) * side_ + cell % side_);
-        q.cell_v[lane] = static_cast<float>(cell / side_);
+        const int cell_row = cell / side_;
+        q.cell_v[lane] = static_cast<float>(cell_row);
         q.slot[lane] = static_cast<std::uint32_t>(slot(column, cell, r));
         q.cell[lane] = static_cast<std::uint32_t>(column * cells + cell);
         q.key[lane] = key;
@@ -118,9 +119,9 @@ void RowTracer::aim(const TracedFrame& frame, RayPacket& rays) const noexcept {
 
 /// Whether the pixel of a sample in hand is one where the body can be.
 bool RowTracer::may_see(const TracedFrame& frame, std::size_t lane) const noexcept {
-  const int u =
-      static_cast<int>(camera_.corner.u + 0.5) + static_cast<int>(camera_.cell_u[lane]) / side_;
-  const int v = static_cast<int>(camera_.corner.v + 0.5);
+  const auto pixel_at = [](double corner) { return static_cast<int>(std::lround(corner + 0.5)); };
+  const int u = pixel_at(camera_.corner.u) + static_cast<int>(camera_.cell_u[lane]) / side_;
+  const int v = pixel_at(camera_.corner.v);
   return u >= frame.seen.left && u < frame.seen.right && v >= frame.seen.top &&
          v < frame.seen.bottom;
 }

@@ -119,10 +119,12 @@ class RowTracer {
   [[nodiscard]] std::size_t companions_slots() const noexcept { return slot(columns_, 0, 0); }
   [[nodiscard]] std::size_t companions_cells() const noexcept { return cell_of(columns_, 0); }
   [[nodiscard]] std::size_t cell_of(int column, int cell) const noexcept {
-    return static_cast<std::size_t>(column * side_ * side_ + cell);
+    const int number = column * side_ * side_ + cell;
+    return static_cast<std::size_t>(number);
   }
   [[nodiscard]] std::size_t slot(int column, int cell, int replicate) const noexcept {
-    return static_cast<std::size_t>((column * side_ * side_ + cell) * replicates_ + replicate);
+    const int number = (column * side_ * side_ + cell) * replicates_ + replicate;
+    return static_cast<std::size_t>(number);
   }
   void aim(const TracedFrame& frame, RayPacket& rays) const noexcept;
   [[nodiscard]] bool may_see(const TracedFrame& frame, std::size_t lane) const noexcept;

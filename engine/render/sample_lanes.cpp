@@ -45,6 +45,7 @@ struct Task {
                                         const float* __restrict across, float* __restrict x,
                                         float* __restrict y) noexcept {
   for (std::size_t i = 0; i < kLanes; ++i) {
+    // lround() keeps no lanes. NOLINTNEXTLINE(bugprone-incorrect-roundings)
     const auto quarter = static_cast<std::int32_t>(4.0F * turns[i] + 0.5F);
     const float r = 1.5707963268F * (4.0F * turns[i] - static_cast<float>(quarter));
     const float r2 = r * r;
@@ -80,10 +81,12 @@ __attribute__((target("avx2"))) void turn_avx2(const float* t, const float* r, f
                                                float* y) noexcept {
   turn(t, r, x, y);
 }
+// NOLINTBEGIN(clang-diagnostic-ignored-attributes): the vectors' width is GCC's own.
 STARLOOP_AVX512 void draw_avx512(const Task& t, float* a, float* b) noexcept { draw(t, a, b); }
 STARLOOP_AVX512 void turn_avx512(const float* t, const float* r, float* x, float* y) noexcept {
   turn(t, r, x, y);
 }
+// NOLINTEND(clang-diagnostic-ignored-attributes)
 #endif
 
 Kernels best_kernels() noexcept {

@@ -242,9 +242,8 @@ std::uint32_t SurfacePatches::at(const SurfacePoint& place) const noexcept {
   float nearest = std::numeric_limits<float>::infinity();
   const float cube_m = 1.0F / grid_.per_m;
   for (int n = 0; n < 27; ++n) {
-    const Vector3f step(static_cast<float>(n % 3 - 1), static_cast<float>(n / 3 % 3 - 1),
-                        static_cast<float>(n / 9 - 1));
-    const std::size_t beside = grid_.cube_of(place.place + cube_m * step);
+    const Eigen::Vector3i step(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
+    const std::size_t beside = grid_.cube_of(place.place + cube_m * step.cast<float>());
     for (std::uint32_t p = first_in_cube_[beside]; p < first_in_cube_[beside + 1]; ++p) {
       if (patches_[p].normal.dot(place.normal) <= kSameWay) continue;
       const float away = (patches_[p].place - place.place).squaredNorm();

@@ -29,7 +29,7 @@ TexelGrid::TexelGrid(const TracedTarget& target)
                                             target.facets.on_side(f, 0, 1, 0).place};
     Frame frame;
     for (std::uint8_t top = 0; top < 3; ++top) {
-      const Vector3f start = corner[(top + 1U) % 3U];
+      const Vector3f& start = corner[(top + 1U) % 3U];
       const Vector3f edge = corner[(top + 2U) % 3U] - start;
       const float edge_m = edge.norm();
       if (!(edge_m > frame.edge_m)) continue;
@@ -73,11 +73,12 @@ TexelGrid::Texel TexelGrid::texel(std::uint32_t number) const noexcept {
   const std::uint32_t inside = number - s.first;
   const std::array<float, 2> span = {1.0F / static_cast<float>(s.along),
                                      1.0F / static_cast<float>(s.up)};
-  return {
-      index / 2,
-      index % 2,
-      {static_cast<float>(inside / s.up) * span[0], static_cast<float>(inside % s.up) * span[1]},
-      span};
+  const std::uint32_t along = inside / s.up;
+  const std::uint32_t up = inside % s.up;
+  return {index / 2,
+          index % 2,
+          {static_cast<float>(along) * span[0], static_cast<float>(up) * span[1]},
+          span};
 }
 
 SurfacePoint TexelGrid::place(const Texel& texel, float a, float b) const noexcept {

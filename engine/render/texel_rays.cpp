@@ -55,7 +55,7 @@ class RayNumbers {
 };
 
 std::uint16_t rounded(float weight) noexcept {
-  return static_cast<std::uint16_t>(std::clamp(weight, 0.0F, 1.0F) * kWeightSteps + 0.5F);
+  return static_cast<std::uint16_t>(std::lround(std::clamp(weight, 0.0F, 1.0F) * kWeightSteps));
 }
 
 }  // namespace

@@ -108,6 +108,8 @@ __attribute__((target("avx2"))) void cover_avx2(const Block& b, std::uint32_t* s
                                                 std::size_t w) noexcept {
   cover(b, s, n, w);
 }
+// GCC's own attribute: it takes half registers else.
+// NOLINTNEXTLINE(clang-diagnostic-ignored-attributes)
 __attribute__((target("avx512f,avx512vl,avx512bw,avx512dq,prefer-vector-width=512"))) void
 cover_avx512(const Block& b, std::uint32_t* s, float* n, std::size_t w) noexcept {
   cover(b, s, n, w);
@@ -132,7 +134,7 @@ int floor_div(std::int32_t a, int b) noexcept { return (a >= 0 ? a : a - (b - 1)
 TriangleRaster::TriangleRaster(std::size_t vertices, std::size_t triangles, int most_bands)
     : places_(vertices), sorted_(triangles), most_bands_(most_bands) {
   // Over all levels, at most twice as many buckets as bands, and two more for each.
-  bucket_begin_.reserve(2 * static_cast<std::size_t>(most_bands) + 2 * kLevels + 1);
+  bucket_begin_.reserve(2 * static_cast<std::size_t>(most_bands) + std::size_t{2} * kLevels + 1);
 }
 
 bool TriangleRaster::place(const Mesh& mesh, std::span<const Corner> corners, int columns, int rows,
@@ -257,8 +259,8 @@ void TriangleRaster::see_triangle(std::uint32_t triangle, int band_row,
     for (std::size_t e = 0; e < 3; ++e) {
       const EdgeFunction& f = edges[e];
       const std::int64_t here = f.at_zero + f.per_x * x + f.per_y * y;
-      const std::int64_t most = here + std::max<std::int64_t>(0, f.per_x) * (kLanes * kStep) +
-                                std::max<std::int64_t>(0, f.per_y) * (block.rows * kStep);
+      const std::int64_t most = here + std::max<std::int64_t>(0, f.per_x) * kLanes * kStep +
+                                std::max<std::int64_t>(0, f.per_y) * block.rows * kStep;
       outside = outside || most < 0;
       block.edge[e] = static_cast<std::int32_t>(std::clamp(here, -kFar, kFar));
       block.per_x[e] = f.per_x;

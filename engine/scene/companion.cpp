@@ -46,6 +46,7 @@ std::vector<CompanionSpec> read_companions(const ConfigReader& config) {
                                           std::to_string(names.size()));
   }
   std::vector<CompanionSpec> companions;
+  companions.reserve(names.size());
   for (const std::string& name : names) companions.push_back(read_companion(config, name));
   return companions;
 }

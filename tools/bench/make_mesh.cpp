@@ -10,7 +10,7 @@ int main(int argc, char** argv) {
   const double triangles = argc > 2 ? std::atof(argv[2]) : 200e3;
   const double rms_mm = argc > 3 ? std::atof(argv[3]) : 2.0;
   const double seed = argc > 4 ? std::atof(argv[4]) : 1.0;
-  if (argc < 2 || argc > 5 || !(triangles >= 1.0 && triangles <= 1e7) ||
+  if (argc < 2 || argc > 5 || argv[1][0] == '-' || !(triangles >= 1.0 && triangles <= 1e7) ||
       !(rms_mm >= 0.0 && rms_mm <= 1e3) || !(seed >= 0.0 && seed <= 1e15)) {
     std::fputs("usage: make_mesh FILE.obj [TRIANGLES, up to 1e7 [WRINKLES_MM [SEED]]]\n", stderr);
     return 2;

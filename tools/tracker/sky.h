@@ -27,7 +27,7 @@ class Sky {
   /// Of an image of 16-bit pixels of this size.
   void measure(const cv::Mat& image);
   [[nodiscard]] const Block& at(int u, int v) const noexcept {
-    return blocks_[static_cast<std::size_t>(v / kBlock_px * columns_ + u / kBlock_px)];
+    return blocks_[index(u / kBlock_px, v / kBlock_px)];
   }
 
  private:
@@ -36,7 +36,8 @@ class Sky {
   void follow_majority();
   [[nodiscard]] double slope(int columns_apart, int rows_apart);
   [[nodiscard]] std::size_t index(int column, int row) const noexcept {
-    return static_cast<std::size_t>(row * columns_ + column);
+    const int number = row * columns_ + column;
+    return static_cast<std::size_t>(number);
   }
 
   int columns_;

@@ -54,9 +54,10 @@ TEST(HemisphereBins, EachHoldsTheSameShareByTheCosine) {
   constexpr int kSteps = 16;
   for (std::size_t bin = 0; bin < HemisphereBins::kBins; ++bin) {
     for (int i = 0; i < kSteps * kSteps; ++i) {
+      const int row = i / kSteps;
       const Vector3f d =
           HemisphereBins::direction(bin, (static_cast<float>(i % kSteps) + 0.5F) / kSteps,
-                                    (static_cast<float>(i / kSteps) + 0.5F) / kSteps);
+                                    (static_cast<float>(row) + 0.5F) / kSteps);
       ASSERT_NEAR(static_cast<double>(d.norm()), 1.0, 1e-6);
       mean += d.cast<double>() / (HemisphereBins::kBins * kSteps * kSteps);
     }
