@@ -23,6 +23,8 @@ constexpr double kMostOff = 1.5;
 constexpr std::size_t kRefinedAFrame = 2048;
 constexpr std::size_t kRefinedOf = 64;
 constexpr std::uint32_t kMostSets = 8;
+// Texels made in a frame: so many first rays take 35 ms of one core.
+constexpr std::size_t kMadeAFrame = 16384;
 constexpr std::uint32_t kNumberBits = 28;
 constexpr float kMostTurned_rad = 8e-3F;
 constexpr std::uint32_t kSumEvery = 4;
@@ -85,20 +87,21 @@ void TexelLight::start_over(float texel_m) noexcept {
 }
 
 /// False: there was no room.
-bool TexelLight::make_asked() noexcept {
+bool TexelLight::make_asked(bool all) noexcept {
   const std::uint8_t* const begin = asked_.data();
   const std::uint8_t* const end = begin + grid_.texels();
-  for (const std::uint8_t* next = begin; next != end; ++next) {
+  if (rays_.size() + static_cast<std::size_t>(std::count(begin, end, 1)) > TexelRays::kMostSets) {
+    least_m_ = static_cast<float>(kMostOff) * texel_m_;
+    start_over(least_m_);
+    return false;
+  }
+  std::size_t left = all ? grid_.texels() : kMadeAFrame;
+  for (const std::uint8_t* next = begin; next != end && left > 0; ++next, --left) {
     next = static_cast<const std::uint8_t*>(
         std::memchr(next, 1, static_cast<std::size_t>(end - next)));
     if (next == nullptr) break;
     const auto number = static_cast<std::uint32_t>(next - begin);
     asked_[number] = 0;
-    if (rays_.full()) {
-      least_m_ = static_cast<float>(kMostOff) * texel_m_;
-      start_over(least_m_);
-      return false;
-    }
     first_of_[number] = static_cast<std::uint32_t>(rays_.size());
     keep(grid_.texel(number), number);
   }
@@ -166,7 +169,7 @@ bool TexelLight::update(const Snapshot& snapshot, const LampInView& lamp, double
   const float wished_m = std::max(static_cast<float>(px_m / kTexelsAPx), least_m_);
   if (!(wished_m <= kMostOff * texel_m_ && texel_m_ <= kMostOff * wished_m)) start_over(wished_m);
   const std::size_t before = rays_.size();
-  const bool had_room = make_asked();
+  const bool had_room = make_asked(all_rays);
   make_wanted();
   choose_due();
   ++frame_;

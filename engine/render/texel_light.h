@@ -20,7 +20,8 @@ namespace engine {
 /// the Earth's sunlit cap where the sky is open to it, kept by texels as fine as the camera's
 /// pixels: where surfaces stand close together BodyLight's patches are too coarse.
 ///
-/// A texel has 64 rays (TexelRays). It is made in the frame after one that asked for it; it begins
+/// A texel has 64 rays (TexelRays). It is made after a frame that asked for it, 16 384 a frame: the
+/// others' light is BodyLight's until then. It begins
 /// with eight of its rays and gets the others as frames go by, and when it has all and is wanted
 /// better a further set, up to eight. Which of the places met are in the light is asked anew when
 /// the lamp has turned by 8 mrad or 64 frames have passed; what goes to the camera is summed up
@@ -125,7 +126,7 @@ class TexelLight {
   };
 
   void start_over(float texel_m) noexcept;
-  [[nodiscard]] bool make_asked() noexcept;
+  [[nodiscard]] bool make_asked(bool all) noexcept;
   void make_wanted() noexcept;
   void keep(const TexelGrid::Texel& texel, std::uint32_t number) noexcept;
   void choose_due() noexcept;

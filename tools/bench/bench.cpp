@@ -257,7 +257,7 @@ enum class Packing { kCopy, kPack, kUnpack, kPackPlain, kUnpackPlain };
 
 /// A frame's pixels, at 2 bytes each a second: packing against copying them.
 void bench_packing(benchmark::State& state, Packing how) {
-  std::vector<std::uint16_t> pixels(1024 * 1024);
+  std::vector<std::uint16_t> pixels(std::size_t{1024} * 1024);
   for (std::size_t i = 0; i < pixels.size(); ++i) pixels[i] = static_cast<std::uint16_t>(i & 2047);
   std::vector<std::uint16_t> copy(pixels.size());
   std::vector<std::byte> packed(drivers::packed_bytes(pixels.size()));

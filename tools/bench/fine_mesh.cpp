@@ -112,7 +112,7 @@ Mesh with_edges_up_to(const Mesh& mesh, float longest_m) {
 
 Mesh subdivided(const Mesh& mesh, std::size_t triangles) {
   ENSURE(triangles <= kMostTriangles);
-  const Mesh shared = with_shared_vertices(mesh);
+  Mesh shared = with_shared_vertices(mesh);
   if (shared.triangles.size() >= triangles) return shared;
   // Between edges that are long enough to stay and those that make too many triangles.
   auto coarse_m = static_cast<float>(2.0 * mesh.bounding_radius_m());

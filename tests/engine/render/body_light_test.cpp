@@ -333,6 +333,22 @@ TEST(TexelLight, FirstRaysOfNeighboursStandForEachOther) {
   EXPECT_NEAR(among.mean / want, 1.0, 0.03);
 }
 
+TEST(TexelLight, ManyAreMadeInSeveralFramesThoughAskedForOnce) {
+  Texels texels(corner(), before_the_wall());
+  for (float second = 0.0F; second < 1.0F; second += 2e-3F)
+    for (float third = 0.0F; third < 1.0F - second; third += 2e-3F)
+      for (const unsigned side : {0U, 1U}) (void)texels.light.at(2, side, second, third);
+  std::vector<std::size_t> sizes;
+  for (int i = 0; i < 4; ++i) {
+    texels.light.update(texels.seen, {0, texels.view}, Texels::kPx_m, false, texels.pool);
+    sizes.push_back(texels.light.size());
+  }
+  EXPECT_EQ(sizes[0], 16384U);
+  EXPECT_GT(sizes[1], sizes[0]);
+  EXPECT_LE(sizes[1], 2U * 16384U);
+  EXPECT_EQ(sizes[3], sizes[2]);
+}
+
 TEST(TexelLight, MoreTexelsThanThereIsRoomForAreMadeCoarser) {
   Texels texels(corner(), before_the_wall());
   // Pixels of a centimetre: 144 m^2 of texels of a third of that are 13 million.
