@@ -111,7 +111,8 @@ RenderReport LatticeRenderer::render(const Snapshot& snapshot, Budget budget,
       return again;
     };
     const int most = spec_.settled ? kMostSettledRounds : kMostRounds;
-    bool again = update() || texels_.cold() || spec_.settled;
+    // Where texels begin anew later on, patches do for a frame.
+    bool again = update() || !std::exchange(begun_, true) || spec_.settled;
     for (int round = 0; round < most && again; ++round) {
       noise_.start(region, view_.points_a_pixel(), limit);
       pool_.rows(0, region.height(), [&](int row) { shade_row(snapshot, out, row); });

@@ -120,6 +120,7 @@ class LatticeRenderer final : public Renderer {
   WorkerPool& pool_;
   std::vector<std::unique_ptr<Bench>> benches_;  ///< one a thread
   std::vector<RowCounts> row_counts_;            ///< by row of pixels
+  bool begun_ = false;                           ///< there was a frame with bounces
   // Of the frame in hand.
   std::array<Eigen::Vector3f, kLamps> toward_lamp_;
   std::size_t texel_lamp_ = 0;  ///< the brighter one

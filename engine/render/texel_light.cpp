@@ -23,8 +23,8 @@ constexpr double kMostOff = 1.5;
 constexpr std::size_t kRefinedAFrame = 2048;
 constexpr std::size_t kRefinedOf = 64;
 constexpr std::uint32_t kMostSets = 8;
-// Texels made in a frame: so many first rays take 35 ms of one core.
-constexpr std::size_t kMadeAFrame = 16384;
+// Texels made in a frame: so many first rays take 20 ms of one core.
+constexpr std::size_t kMadeAFrame = 8192;
 constexpr std::uint32_t kNumberBits = 28;
 constexpr float kMostTurned_rad = 8e-3F;
 constexpr std::uint32_t kSumEvery = 4;

@@ -20,7 +20,7 @@ namespace engine {
 /// the Earth's sunlit cap where the sky is open to it, kept by texels as fine as the camera's
 /// pixels: where surfaces stand close together BodyLight's patches are too coarse.
 ///
-/// A texel has 64 rays (TexelRays). It is made after a frame that asked for it, 16 384 a frame: the
+/// A texel has 64 rays (TexelRays). It is made after a frame that asked for it, 8192 a frame: the
 /// others' light is BodyLight's until then. It begins
 /// with eight of its rays and gets the others as frames go by, and when it has all and is wanted
 /// better a further set, up to eight. Which of the places met are in the light is asked anew when
@@ -53,8 +53,6 @@ class TexelLight {
   /// that have to be asked for, or there is more of what all rays are asked for.
   bool update(const Snapshot& snapshot, const LampInView& lamp, double px_m, bool all_rays,
               WorkerPool& pool) noexcept;
-  /// Nothing is kept yet: a frame had better ask, update again and then look.
-  [[nodiscard]] bool cold() const noexcept { return rays_.size() == 0; }
 
   static constexpr std::uint32_t kNone = TexelRays::kNone;
   /// What goes to the camera.
