@@ -286,16 +286,17 @@ void TexelLight::smooth(std::size_t first, std::size_t end, bool all) noexcept {
       sum.of_lamp += weight * value.of_lamp;
       sum.of_earth_w_m2_sr += weight * value.of_earth_w_m2_sr;
       sum.noise += weight * weight * value.noise * value.noise;
-      sum.noise_of_one += weight * weight * value.noise_of_one * value.noise_of_one;
     };
     const TexelRays::Set& set = rays_.set(k);
     grid_.each_near(set.number, set.texel, own.reach_m, add);
+    const float averaged = sum.rays * sum.rays / squares;
+    // By its own noise alone: what its neighbours get must not depend on theirs, see want_more().
     shown_[k] = {.of_lamp = sum.of_lamp / sum.rays,
                  .noise = std::sqrt(sum.noise) / sum.rays,
                  .of_earth_w_m2_sr = sum.of_earth_w_m2_sr / sum.rays,
-                 .noise_of_one = std::sqrt(sum.noise_of_one) / sum.rays,
+                 .noise_of_one = own.noise_of_one / std::sqrt(averaged),
                  .sets = own.sets,
-                 .averaged = sum.rays * sum.rays / squares};
+                 .averaged = averaged};
   }
 }
 
