@@ -27,8 +27,8 @@ double share_beside_target(const Radiance& in, const PointSource& star) noexcept
   return std::clamp(1.0 - covered / steps, 0.0, 1.0);
 }
 
-Starlight::Starlight(StarField field, PointSplat splat, const DetectorSpec& detector)
-    : field_(std::move(field)), splat_(std::move(splat)), detector_(detector) {
+Starlight::Starlight(StarField field, PointSplat& splat, const DetectorSpec& detector)
+    : field_(std::move(field)), splat_(splat), detector_(detector) {
   drawn_.reserve(std::min(field_.size(), kMostStars));
 }
 

@@ -37,7 +37,8 @@ class Starlight {
   static constexpr double kUnseenShareOfNoise = 0.1;
   static constexpr std::size_t kMostStars = 131072;  ///< that one frame draws
 
-  Starlight(StarField field, PointSplat splat, const DetectorSpec& detector);
+  /// `splat` outlives this.
+  Starlight(StarField field, PointSplat& splat, const DetectorSpec& detector);
 
   /// Adds the stars to `out`, the blurred image of all else. `in` is what the target's image was
   /// made of.
@@ -46,7 +47,7 @@ class Starlight {
 
  private:
   StarField field_;
-  PointSplat splat_;
+  PointSplat& splat_;
   DetectorSpec detector_;
   std::vector<PointSource> drawn_;
 };

@@ -23,12 +23,13 @@ double airy_constant(const OpticsSpec& spec) {
 
 /// Shares of a point's light by displacement, on `places` points `step_px` apart along each axis,
 /// the first at no displacement: the cosine transform of the OTF over one quarter of the plane.
-Eigen::MatrixXd image_of_a_point(const BandOtf& diffraction, double pitch_m, int places,
-                                 double step_px) {
+Eigen::MatrixXd image_of_a_point(const BandOtf& diffraction, double pitch_m,
+                                 const PointSplat::Kind& kind, int places, double step_px) {
   // Images repeat after so many pixels; half of that away from a neighbour 3e-8 of the light is
   // left.
   constexpr int kPeriod_px = 256;
   const int waves = static_cast<int>(diffraction.cutoff_per_m() * pitch_m * kPeriod_px) + 1;
+  const auto square = [&](double f) { return sinc(f) / sinc(f * kind.mean_over_px); };
   Eigen::MatrixXd cosines(places, waves);
   Eigen::MatrixXd otf(waves, waves);
   for (int k = 0; k < waves; ++k) {
@@ -37,7 +38,9 @@ Eigen::MatrixXd image_of_a_point(const BandOtf& diffraction, double pitch_m, int
     for (int i = 0; i < places; ++i) cosines(i, k) = share * std::cos(2.0 * kPi * f * i * step_px);
     for (int j = 0; j < waves; ++j) {
       const double g = static_cast<double>(j) / kPeriod_px;
-      otf(k, j) = diffraction.at(std::hypot(f, g) / pitch_m) * sinc(f) * sinc(g);
+      const double per_px = std::hypot(f, g);
+      const double apart = kind.wings != nullptr ? kind.wings->otf(per_px) : 0.0;
+      otf(k, j) = (diffraction.at(per_px / pitch_m) - apart) * square(f) * square(g);
     }
   }
   return cosines * otf * cosines.transpose();
@@ -71,7 +74,8 @@ struct PointSplat::Footprint {
   int reach_px;
 };
 
-PointSplat::PointSplat(const OpticsSpec& spec, double faint_w_m2, WorkerPool& pool)
+PointSplat::PointSplat(const OpticsSpec& spec, double faint_w_m2, WorkerPool& pool,
+                       const Kind& kind)
     : width_px_(spec.camera.width_px),
       height_px_(spec.camera.height_px),
       core_px_(std::min(kCore_px, spec.largest_wing_px)),
@@ -79,17 +83,17 @@ PointSplat::PointSplat(const OpticsSpec& spec, double faint_w_m2, WorkerPool& po
       gain_(throughput_sr(spec) / std::pow(spec.camera.ifov_rad(), 2)),
       airy_(airy_constant(spec)),
       faint_w_m2_(faint_w_m2),
-      largest_reach_px_(spec.largest_wing_px),
+      largest_reach_px_(kind.wings != nullptr ? core_px_ : spec.largest_wing_px),
       pool_(pool),
       footprints_(static_cast<std::size_t>((height_px_ + kBandRows - 1) / kBandRows)) {
-  fill_tables(spec);
+  fill_tables(spec, kind);
 }
 
-void PointSplat::fill_tables(const OpticsSpec& spec) {
+void PointSplat::fill_tables(const OpticsSpec& spec, const Kind& kind) {
   const int side = 2 * core_px_ + 1;
   const int places = (core_px_ + 1) * kPhases + 2;
   const Eigen::MatrixXd image =
-      image_of_a_point(BandOtf(spec.band), spec.camera.pixel_pitch_m, places, 1.0 / kPhases);
+      image_of_a_point(BandOtf(spec.band), spec.camera.pixel_pitch_m, kind, places, 1.0 / kPhases);
   peak_share_ = image(0, 0);
   const int shares = kTables * kTables * side * stride_;
   tables_.resize(static_cast<std::size_t>(shares));
@@ -119,17 +123,20 @@ double PointSplat::reach_px(double irradiance_w_m2) const noexcept {
                     largest_reach_px_);
 }
 
-PointSplat::Report PointSplat::add(std::span<const PointSource> points,
-                                   IrradianceImage& out) noexcept {
+PointSplat::Report PointSplat::add(std::span<const PointSource> points, IrradianceImage& out,
+                                   double least_reach_px) noexcept {
   ENSURE(out.width() == width_px_ && out.height() == height_px_);
   Report report;
   if (points.empty()) return report;
+  const auto reach = [&](const PointSource& point) {
+    return std::max(reach_px(point.irradiance_w_m2), std::min(least_reach_px, largest_reach_px_));
+  };
   const int bands = static_cast<int>(footprints_.size());
   pool_.rows(0, bands, [&](int b) {
     const Band band{b * kBandRows, std::min((b + 1) * kBandRows, height_px_)};
     std::uint64_t& count = footprints_[static_cast<std::size_t>(b)];
     count = 0;
-    for (const PointSource& point : points) streak(point, band, out, count);
+    for (const PointSource& point : points) streak(point, reach(point), band, out, count);
   });
   for (const std::uint64_t count : footprints_) report.footprints += count;
   double light = 0;
@@ -137,15 +144,15 @@ PointSplat::Report PointSplat::add(std::span<const PointSource> points,
   for (const PointSource& point : points) {
     light += point.irradiance_w_m2;
     // The mean Airy pattern's law, added up over all that lies further away.
-    lost += point.irradiance_w_m2 * 2.0 * kPi * airy_ / reach_px(point.irradiance_w_m2);
+    lost += point.irradiance_w_m2 * 2.0 * kPi * airy_ / reach(point);
   }
   report.lost_flux_share = light > 0.0 ? lost / light : 0.0;
   return report;
 }
 
-void PointSplat::streak(const PointSource& point, const Band& band, IrradianceImage& out,
-                        std::uint64_t& footprints) const noexcept {
-  const double reach = std::ceil(reach_px(point.irradiance_w_m2));
+void PointSplat::streak(const PointSource& point, double followed_px, const Band& band,
+                        IrradianceImage& out, std::uint64_t& footprints) const noexcept {
+  const double reach = std::ceil(followed_px);
   const double light = point.irradiance_w_m2 * gain_;
   const PixelPoint& m = point.motion_px;
   // The part of the line, from -.5 to .5, whose images can reach the band.

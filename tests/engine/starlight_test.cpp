@@ -33,9 +33,10 @@ struct Scene {
     star.v_magnitude = v;
     star.colour_b_v = 0.653F;
     catalogue.stars = {star};
+    splat = std::make_unique<PointSplat>(optics, kFaint_w_m2, pool);
     starlight = std::make_unique<Starlight>(
-        StarField(catalogue, optics.camera, StarLight(detector.mean_wavelength_m)),
-        PointSplat(optics, kFaint_w_m2, pool), detector);
+        StarField(catalogue, optics.camera, StarLight(detector.mean_wavelength_m)), *splat,
+        detector);
   }
   StarReport add(const Radiance& in = {}) {
     image.resize(kSide_px, kSide_px);
@@ -49,6 +50,7 @@ struct Scene {
   }
   WorkerPool pool;
   DetectorSpec detector;
+  std::unique_ptr<PointSplat> splat;
   std::unique_ptr<Starlight> starlight;
   IrradianceImage image;
 };

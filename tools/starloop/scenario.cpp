@@ -323,7 +323,7 @@ Rig::Rig(const Scenario& scenario, int threads)
     stars = std::make_unique<engine::Starlight>(
         engine::StarField(catalogue, scenario.scene.camera,
                           engine::StarLight(detector.mean_wavelength_m)),
-        engine::PointSplat(scenario.optics, faint_w_m2, pool_), detector);
+        optics.splat(), detector);
   }
   generator_ = std::make_unique<engine::ImagingChain>(
       engine::SnapshotBuilder(scene, camera_, target_, move_companions(scenario)),

@@ -62,6 +62,7 @@ struct Rig {
   static OpticsSpec optics_spec(const Choice& choice) {
     OpticsSpec spec;
     spec.camera = small_camera(choice.side_px);
+    spec.largest_wing_px = 64;
     return spec;
   }
   static double to_e() { return DetectorSpec{}.electrons_per_irradiance(kExposure); }

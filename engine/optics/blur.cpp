@@ -1,0 +1,188 @@
+#include "engine/optics/blur.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/core/constants.h"
+
+namespace engine {
+namespace {
+
+constexpr int kShortest = 16;
+
+std::size_t at(int i) noexcept { return static_cast<std::size_t>(i); }
+
+/// Lengths with small factors only, and multiples of eight.
+bool is_fast(int n) noexcept {
+  for (const int factor : {2, 3, 5})
+    while (n % factor == 0) n /= factor;
+  return n == 1;
+}
+
+std::complex<float> phase_of(double turns) noexcept {
+  return std::complex<float>(std::polar(1.0, -2.0 * kPi * turns));
+}
+
+}  // namespace
+
+int Blur::fast_length(int at_least) noexcept {
+  int n = (std::max(at_least, kShortest) + 7) / 8 * 8;
+  while (!is_fast(n)) n += 8;
+  return n;
+}
+
+Blur::Blur(int longest, int step, WorkerPool& pool) : step_(step), pool_(pool) {
+  std::vector<int> lengths;
+  for (int n = fast_length(0);; n = fast_length(n + 1)) {
+    lengths.push_back(n);
+    if (step > 1) lengths.push_back(n * step);
+    if (n >= longest) break;
+  }
+  const int side = lengths.back() / step * step;  // in cells
+  const int samples = side / step;
+  const int shares = pool.threads() * 2;
+  for (int i = 0; i < shares; ++i) lines_.emplace_back(lengths);
+  line_in_.assign(at(shares), std::vector<Complex>(at(side)));
+  line_out_.assign(at(shares), std::vector<Complex>(at(side)));
+  line_real_.assign(at(shares), std::vector<Lanes>(at(side)));
+  const std::size_t groups = at(side / 2 / Lanes::kCount + 1);
+  turned_.resize(at(side));
+  spectrum_.resize(groups * at(side));
+  folded_.resize(groups * at(samples));
+  samples_.resize(at(samples) * at(samples));
+}
+
+/// Calls work(share, index) for every index in [0, count); a share never runs twice at once.
+template <class Work>
+void Blur::share(int count, const Work& work) noexcept {
+  const int shares = static_cast<int>(lines_.size());
+  pool_.rows(0, shares, [&](int s) {
+    for (int i = count * s / shares; i < count * (s + 1) / shares; ++i) work(at(s), i);
+  });
+}
+
+void Blur::transform(const RadianceImage& picture, const Grid& grid, const GridOtf& otf) noexcept {
+  const int rows = (picture.height() + Lanes::kCount - 1) / Lanes::kCount * Lanes::kCount;
+  ENSURE(grid.left >= 0 && grid.left + picture.width() <= grid.width);
+  ENSURE(grid.top >= 0 && grid.top + rows <= grid.height);
+  grid_ = grid;
+  columns_ = std::min(grid.width / 2, static_cast<int>(otf.cutoff() * grid.width)) + 1;
+  transform_rows(picture);
+  multiply_columns(grid.top, grid.top + rows, otf);
+}
+
+void Blur::transform_rows(const RadianceImage& picture) noexcept {
+  constexpr int kLanes = Lanes::kCount;
+  share((picture.height() + kLanes - 1) / kLanes, [&](std::size_t s, int four) {
+    const auto line = std::span(line_real_[s]).first(at(grid_.width));
+    std::ranges::fill(line, Lanes{});
+    for (int lane = 0; lane < kLanes; ++lane) {
+      const int y = four * kLanes + lane;
+      if (y >= picture.height()) break;
+      const auto cells = picture.row(y);
+      for (std::size_t x = 0; x < cells.size(); ++x) line[at(grid_.left) + x].v[lane] = cells[x];
+    }
+    const auto half = std::span(line_out_[s]).first(line.size() / 2 + 1);
+    lines_[s].forward(std::span<const Lanes>(line), half);
+    const std::size_t first = at(grid_.top + four * kLanes);
+    for (int g = 0; g < groups(); ++g) {
+      Complex* column = &spectrum_[at(g) * at(grid_.height) + first];
+      for (int lane = 0; lane < kLanes; ++lane) {
+        Lanes re;
+        Lanes im;
+        for (int c = 0; c < kLanes && g * kLanes + c < columns_; ++c) {
+          const Complex& value = half[at(g * kLanes + c)];
+          re.v[c] = value.real().v[lane];
+          im.v[c] = value.imag().v[lane];
+        }
+        column[lane] = Complex(re, im);
+      }
+    }
+  });
+}
+
+void Blur::multiply_columns(int filled_from, int filled_to, const GridOtf& otf) noexcept {
+  share(groups(), [&](std::size_t s, int g) {
+    const auto line = std::span(spectrum_).subspan(at(g) * at(grid_.height), at(grid_.height));
+    std::ranges::fill(line.first(at(filled_from)), Complex{});
+    std::ranges::fill(line.subspan(at(filled_to)), Complex{});
+    const auto waves = std::span(line_out_[s]).first(line.size());
+    lines_[s].forward(std::span<const Complex>(line), waves);
+    Lanes fx;
+    for (int c = 0; c < Lanes::kCount; ++c)
+      fx.v[c] = static_cast<float>(static_cast<double>(g * Lanes::kCount + c) / grid_.width);
+    const auto factors = std::span(line_in_[s]).first(line.size());
+    otf.fill_column(fx, factors);
+    for (std::size_t k = 0; k < line.size(); ++k) line[k] = waves[k] * factors[k];
+  });
+}
+
+void Blur::sample(double move_x, double move_y) noexcept {
+  for (int k = 0; k < grid_.height; ++k) {
+    const int wave = k <= grid_.height / 2 ? k : k - grid_.height;
+    turned_[at(k)] = phase_of(static_cast<double>(wave) / grid_.height * move_y);
+  }
+  fold_columns(move_x, move_y);
+  sample_rows();
+}
+
+void Blur::fold_columns(double move_x, double move_y) noexcept {
+  const std::size_t samples = at(samples_y());
+  const bool moves = move_x != 0.0 || move_y != 0.0;
+  share(groups(), [&](std::size_t s, int g) {
+    const Complex* line = &spectrum_[at(g) * at(grid_.height)];
+    const auto sum = std::span(line_in_[s]).first(samples);
+    Lanes re;
+    Lanes im;
+    for (int c = 0; moves && c < Lanes::kCount; ++c) {
+      const auto turned =
+          phase_of(static_cast<double>(g * Lanes::kCount + c) / grid_.width * move_x);
+      re.v[c] = turned.real();
+      im.v[c] = turned.imag();
+    }
+    std::ranges::fill(sum, Complex{});
+    for (std::size_t k = 0; k < at(grid_.height); ++k)
+      sum[k % samples] +=
+          moves ? line[k] * Complex(re, im) * Complex(turned_[k].real(), turned_[k].imag())
+                : line[k];
+    lines_[s].inverse(std::span<const Complex>(sum),
+                      std::span(folded_).subspan(at(g) * samples, samples));
+  });
+}
+
+void Blur::sample_rows() noexcept {
+  constexpr int kLanes = Lanes::kCount;
+  const int width = samples_x();
+  const int height = samples_y();
+  share(height / kLanes, [&](std::size_t s, int four) {
+    const auto half = std::span(line_in_[s]).first(at(width / 2 + 1));
+    std::ranges::fill(half, Complex{});
+    for (int column = 0; column < columns_; ++column) {
+      const Complex* group = &folded_[at(column / kLanes) * at(height) + at(four * kLanes)];
+      Lanes re;
+      Lanes im;
+      for (int lane = 0; lane < kLanes; ++lane) {
+        re.v[lane] = group[lane].real().v[column % kLanes];
+        im.v[lane] = group[lane].imag().v[column % kLanes];
+      }
+      // The wave itself and its mirror image, each where sampling folds it to.
+      const int k = column % width;
+      const int mirrored = (width - k) % width;
+      if (k <= width / 2) half[at(k)] += Complex(re, im);
+      const bool mirrors = column > 0 && 2 * column < grid_.width;
+      if (mirrors && mirrored <= width / 2) half[at(mirrored)] += Complex(re, -im);
+    }
+    const auto line = std::span(line_real_[s]).first(at(width));
+    lines_[s].inverse(std::span<const Complex>(half), line);
+    for (int lane = 0; lane < kLanes; ++lane) {
+      float* row = &samples_[at(four * kLanes + lane) * at(width)];
+      for (int x = 0; x < width; ++x) row[x] = line[at(x)].v[lane];
+    }
+  });
+}
+
+std::span<const float> Blur::row(int y) const noexcept {
+  return std::span(samples_).subspan(at(y) * at(samples_x()), at(samples_x()));
+}
+
+}  // namespace engine

@@ -1,0 +1,152 @@
+#include "engine/optics/far_wings.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "engine/core/constants.h"
+
+namespace engine {
+namespace {
+
+constexpr int kCell = FarWings::kCell_px;
+constexpr int kTableSteps = 1024;
+// Cells beside the outermost pixel that its interpolation looks at.
+constexpr int kBeside = 2;
+
+std::size_t at(int i) noexcept { return static_cast<std::size_t>(i); }
+
+/// The cell that a pixel lies in; pixels left of the frame are negative.
+int cell_of(int pixel) noexcept {
+  return pixel >= 0 ? pixel / kCell : -((-pixel + kCell - 1) / kCell);
+}
+
+/// Lagrange's cubic for the pixel in the left or the upper half of a cell, a quarter of a cell from
+/// its middle: weights of the cells from two before to one after. The other half is its mirror.
+constexpr std::array<float, 4> kCubic{-0.0390625F, 0.2734375F, 0.8203125F, -0.0546875F};
+
+}  // namespace
+
+FarWings::FarWings(const WingLaw& law, double width, int longest_px, WorkerPool& pool)
+    : pool_(pool),
+      grid_otf_(kCell, 2, Blur::fast_length(longest_px / kCell)),
+      blur_(longest_px / kCell, 1, pool),
+      softness_px_{5.0 * width, 7.0 * width},
+      table_(kTableSteps + 2, 0.0F),
+      line_(at(longest_px / kCell + 4)),
+      wide_(at(Blur::fast_length(longest_px / kCell)) * at(longest_px)) {
+  // The two together have the law's share, and its next term: that of c / (r^2 + s^2)^(3/2) is
+  // - 3/2 c s^2 / r^5.
+  const double s0 = softness_px_[0] * softness_px_[0];
+  const double s1 = softness_px_[1] * softness_px_[1];
+  const double squares = -law.next_px3 / 1.5;
+  const double first = (law.share_px * s1 - squares) / (s1 - s0);
+  strength_ = {2.0 * kPi * first / softness_px_[0],
+               2.0 * kPi * (law.share_px - first) / softness_px_[1]};
+  for (int i = 0; i <= kTableSteps; ++i)
+    table_[at(i)] = static_cast<float>(otf(static_cast<double>(i) / kTableSteps / kCell));
+  cells_.reserve(longest_px / kCell, longest_px / kCell);
+}
+
+double FarWings::otf(double per_px) const noexcept {
+  double sum = 0;
+  for (std::size_t i = 0; i < strength_.size(); ++i)
+    sum += strength_[i] * std::exp(-2.0 * kPi * softness_px_[i] * per_px);
+  return sum;
+}
+
+void FarWings::gather(const RadianceImage& picture, const PixelRect& region,
+                      int oversampling) noexcept {
+  // Light in a cell counts for it and for the next, the more the nearer: so its place is kept.
+  covered_ = {cell_of(region.left) - 1, cell_of(region.top) - 1, cell_of(region.right - 1) + 2,
+              cell_of(region.bottom - 1) + 2};
+  cells_.resize(covered_.width(), covered_.height());
+  std::ranges::fill(cells_.pixels(), 0.0F);
+  const int fine = oversampling * kCell;  // cells of the picture to one of ours
+  const int first_x = (region.left - covered_.left * kCell) * oversampling;
+  const int first_y = (region.top - covered_.top * kCell) * oversampling;
+  // Of the radiance the mean over a cell: what a transform of cells is to be given.
+  const auto share = static_cast<float>(1.0 / (fine * fine));
+  const auto split = [fine](int place) {
+    const int twice = 2 * place + 1 - fine;  // half cells of the picture from the first middle
+    const int low = twice >= 0 ? twice / (2 * fine) : -1;
+    const float part =
+        static_cast<float>(twice - 2 * fine * low) / (2.0F * static_cast<float>(fine));
+    return std::pair(low, part);
+  };
+  const auto line = std::span(line_).first(at(cells_.width()));
+  for (int y = 0; y < picture.height(); ++y) {
+    std::ranges::fill(line, 0.0F);
+    const auto from = picture.row(y);
+    for (int x = 0; x < picture.width(); ++x) {
+      const auto [low, part] = split(first_x + x);
+      line[at(low)] += (1.0F - part) * from[at(x)];
+      line[at(low + 1)] += part * from[at(x)];
+    }
+    const auto [low, part] = split(first_y + y);
+    const auto upper = cells_.row(low);
+    const auto lower = cells_.row(low + 1);
+    for (std::size_t i = 0; i < line.size(); ++i) {
+      upper[i] += share * (1.0F - part) * line[i];
+      lower[i] += share * part * line[i];
+    }
+  }
+}
+
+void FarWings::transform(int reach_px, PixelPoint smear_px) noexcept {
+  const auto margin = [&](double smear) {
+    return static_cast<int>(std::ceil((reach_px + 0.5 * std::abs(smear)) / kCell)) + kBeside;
+  };
+  margin_x_ = margin(smear_px.u);
+  margin_y_ = margin(smear_px.v);
+  Blur::Grid grid;
+  grid.left = margin_x_;
+  grid.top = margin_y_;
+  grid.width = Blur::fast_length(cells_.width() + 2 * margin_x_);
+  grid.height = Blur::fast_length(cells_.height() + 2 * margin_y_ + Lanes::kCount);
+  grid_otf_.prepare(grid.height, {table_, 1.0 * kTableSteps * kCell}, smear_px);
+  blur_.transform(cells_, grid, grid_otf_);
+}
+
+void FarWings::add(PixelPoint move_px, double scale, IrradianceImage& out) noexcept {
+  // Whole cells move by moving the window, the rest by turning the waves.
+  const double cells_u = std::round(move_px.u / kCell);
+  const double cells_v = std::round(move_px.v / kCell);
+  const int left = covered_.left - margin_x_ + static_cast<int>(cells_u);
+  const int top = covered_.top - margin_y_ + static_cast<int>(cells_v);
+  const PixelRect window = PixelRect{(left + kBeside) * kCell, (top + kBeside) * kCell,
+                                     (left + 2 * margin_x_ + cells_.width() - kBeside) * kCell,
+                                     (top + 2 * margin_y_ + cells_.height() - kBeside) * kCell}
+                               .clipped_to({0, 0, out.width(), out.height()});
+  if (window.empty()) return;
+  blur_.sample(move_px.u / kCell - cells_u, move_px.v / kCell - cells_v);
+
+  const int first_row = cell_of(window.top) - kBeside;
+  const int rows = cell_of(window.bottom - 1) + kBeside + 1 - first_row;
+  const auto share = static_cast<float>(scale * blur_.scale());
+  pool_.rows(0, rows, [&](int y) {
+    const auto cells = blur_.row(first_row + y - top);
+    float* wide = &wide_[at(y) * at(window.width())];
+    for (int u = window.left; u < window.right; ++u) {
+      const float* c = &cells[at(cell_of(u) - left)];
+      const int d = u % kCell == 0 ? -1 : 1;  // towards which neighbour it lies
+      wide[u - window.left] =
+          share * (kCubic[0] * c[2 * d] + kCubic[1] * c[d] + kCubic[2] * c[0] + kCubic[3] * c[-d]);
+    }
+  });
+  pool_.rows(window.top, window.bottom, [&](int v) {
+    const int d = v % kCell == 0 ? -1 : 1;
+    const auto wide = [&](int beside) {
+      return &wide_[at(cell_of(v) + beside * d - first_row) * at(window.width())];
+    };
+    const float* a = wide(2);
+    const float* b = wide(1);
+    const float* c = wide(0);
+    const float* e = wide(-1);
+    float* to = &out.row(v)[at(window.left)];
+    for (int i = 0; i < window.width(); ++i)
+      to[i] += kCubic[0] * a[i] + kCubic[1] * b[i] + kCubic[2] * c[i] + kCubic[3] * e[i];
+  });
+}
+
+}  // namespace engine

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "engine/core/image.h"
+#include "engine/optics/fourier.h"
+
+namespace engine {
+
+/// An OTF that depends on the length of the frequency alone, tabulated from 0 on in even steps.
+struct RadialOtf {
+  std::span<const float> table;    ///< the last two are 0: beyond is nothing
+  double steps_per_frequency = 0;  ///< of the table, to a cycle per pixel
+
+  [[nodiscard]] double cutoff_per_px() const noexcept {
+    return static_cast<double>(table.size() - 2) / steps_per_frequency;
+  }
+};
+
+/// The product of an image's OTFs at the frequencies of a grid: a radial one, the pixel's square,
+/// and a straight smear. A cell of the grid is itself an average; that is taken back out.
+/// Thread: loop; fill_column() any. Loop-safe but for the constructor.
+class GridOtf {
+ public:
+  using Complex = FourierLines::Complex;
+
+  /// `cell_px`: a side of the grid's cells. `averages`: 1: a cell has the mean over its square; 2:
+  /// so averaged twice, which makes a pyramid over the cell and half of its neighbours. `longest`:
+  /// cells along a side of the grid, at most.
+  GridOtf(double cell_px, int averages, int longest);
+
+  /// For grids of this height in cells. `radial` is looked at until the next call.
+  void prepare(int height, const RadialOtf& radial, PixelPoint smear_px) noexcept;
+
+  /// Cycles per cell beyond which it is 0.
+  [[nodiscard]] double cutoff() const noexcept;
+  /// At horizontal frequencies `fx`, in cycles per cell, and at the vertical ones k / height, for
+  /// k from 0 on; from half the height on, that less 1.
+  void fill_column(const Lanes& fx, std::span<Complex> out) const noexcept;
+
+ private:
+  /// What depends on the vertical frequency alone.
+  struct Row {
+    float per_px = 0;  ///< the frequency
+    float pixel = 1;
+    float smear = 0;  ///< turns of the smear, and pi times its sine and cosine
+    float sine = 0;
+    float cosine = 1;
+  };
+  [[nodiscard]] double pixel_factor(double per_px) const noexcept;
+
+  double cell_px_;
+  int averages_;
+  RadialOtf radial_;
+  PixelPoint smear_px_;
+  bool smears_ = false;
+  std::vector<Row> rows_;
+};
+
+}  // namespace engine
