@@ -21,13 +21,16 @@ namespace engine {
 /// clear pupil, DOI 10.1098/rspa.1955.0158. Others: transforms of the sampled pupil, its edges by
 /// area.
 ///
-/// Thread: any. Loop-safe but for the constructor and slice().
+/// Within 1e-3 of the exact OTF of the same five wavelengths. These are within 1e-3 of 41 in focus
+/// and 3.1e-3 out of it, where nine would be within 1.5e-3. The point image is nowhere under -1e-6
+/// of its peak; with a spider, of its peak in focus.
+/// Thread: any. Loop-safe but for the constructor, slice() and unseen_defocus_m().
 class LensOtf {
  public:
   using Complex = std::complex<float>;
 
   /// The OTF at one defocus, ready to be asked at many frequencies. Belongs to its LensOtf, which
-  /// outlives it.
+  /// outlives it and stays where it is.
   class Slice {
    public:
     [[nodiscard]] std::complex<double> at(double fx_per_m, double fy_per_m) const noexcept;
@@ -42,8 +45,8 @@ class LensOtf {
     std::vector<Complex> plane_;
   };
 
-  /// `largest_defocus_m`: of either sign; infinity asks for all that the tables carry. Takes up to
-  /// a second, and megabytes: bench says how much.
+  /// `largest_defocus_m`: of either sign; infinity asks for all that the tables carry. A pupil that
+  /// is not radial takes five transforms and 600 kB for each sixth of a wave: a second in all.
   LensOtf(const LensSpec& lens, double largest_defocus_m);
 
   /// Nothing passes from here on.
@@ -54,7 +57,8 @@ class LensOtf {
   [[nodiscard]] bool changes_with_defocus() const noexcept { return largest_defocus_m_ > 0.0; }
   /// What the tables carry: what was asked for, but no more than 16 waves of the shortest
   /// wavelength, 4 for a pupil that is not radial, less what the wavefront errors take. Beyond, the
-  /// image is that at the largest, grown in proportion: what geometry says.
+  /// image is that at the largest, grown in proportion, as geometry has it: up to .02 off where
+  /// that is 7 um, .08 at 2 um.
   [[nodiscard]] double largest_defocus_m() const noexcept { return largest_defocus_m_; }
 
   /// Any frequency, any defocus.
@@ -68,7 +72,8 @@ class LensOtf {
   void focus(double defocus_m, Slice& out) const noexcept;
 
   /// The largest defocus of either sign that changes the OTF by no more than `share`, of 1, at any
-  /// frequency: what is under it can be left out. At most largest_defocus_m().
+  /// frequency: what is under it can be left out. At most largest_defocus_m(); .65 times the mean
+  /// wavelength times the root of `share` for a clear pupil.
   [[nodiscard]] double unseen_defocus_m(double share) const;
 
  private:

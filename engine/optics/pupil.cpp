@@ -217,60 +217,64 @@ std::vector<double> overlap_corners(double shift, double obscuration) {
   return corners;
 }
 
+double Pupil::phase(const Shift& shift, double x, double y) const noexcept {
+  double sum = -shift.curvature * x;
+  if (terms_.empty()) return sum;
+  const double a = x - 0.5 * shift.length;
+  const double b = x + 0.5 * shift.length;
+  const double c = shift.cosine;
+  const double s = shift.sine;
+  return sum + shift.per_m * (wavefront_m(c * a - s * y, s * a + c * y) -
+                              wavefront_m(c * b - s * y, s * b + c * y));
+}
+
+std::complex<double> Pupil::across(const Shift& shift, double x) const noexcept {
+  constexpr double kPart = 0.5;  // 16 nodes to so much
+  OpenLine line(-1.0, 1.0);
+  hide(x - 0.5 * shift.length, shift.turn_rad, line);
+  hide(x + 0.5 * shift.length, shift.turn_rad, line);
+  std::complex<double> sum = 0;
+  for (const auto& piece : line) {
+    const double length = piece.high - piece.low;
+    if (terms_.empty()) {
+      sum += length * std::polar(1.0, phase(shift, x, 0.0));
+      continue;
+    }
+    const int parts = static_cast<int>(length / kPart) + 1;
+    const double half = 0.5 * length / parts;
+    for (int part = 0; part < parts; ++part)
+      for (std::size_t i = 0; i < gauss_.nodes.size(); ++i)
+        sum +=
+            half * gauss_.weights[i] *
+            std::polar(1.0, phase(shift, x, piece.low + half * (2 * part + 1 + gauss_.nodes[i])));
+  }
+  return sum;
+}
+
 std::complex<double> Pupil::otf(double nu_x, double nu_y, double wavelength_m,
                                 double defocus_m) const {
   const double nu = std::hypot(nu_x, nu_y);
   if (nu >= 1.0) return 0.0;
-  const double shift = 2.0 * nu;
   const double turn = nu > 0.0 ? std::atan2(nu_y, nu_x) : 0.0;
-  const double c = std::cos(turn);
-  const double s = std::sin(turn);
   const double per_m = 2.0 * kPi / wavelength_m;
-  const double curvature = 2.0 * per_m * (defocus_m + curvature_m_) * shift;
-  // Along the shift is x, across y; the two pupils stand at x = +-shift/2.
-  const auto phase = [&](double x, double y) {
-    double sum = -curvature * x;
-    if (terms_.empty()) return sum;
-    const double a = x - 0.5 * shift;
-    const double b = x + 0.5 * shift;
-    sum += per_m *
-           (wavefront_m(c * a - s * y, s * a + c * y) - wavefront_m(c * b - s * y, s * b + c * y));
-    return sum;
-  };
-  const auto across = [&](double x) {
-    OpenLine line(-1.0, 1.0);
-    hide(x - 0.5 * shift, turn, line);
-    hide(x + 0.5 * shift, turn, line);
-    std::complex<double> sum = 0;
-    for (const auto& piece : line) {
-      if (terms_.empty()) {
-        sum += (piece.high - piece.low) * std::polar(1.0, phase(x, 0.0));
-        continue;
-      }
-      const int parts = static_cast<int>((piece.high - piece.low) / 0.5) + 1;
-      const double half = 0.5 * (piece.high - piece.low) / parts;
-      for (int part = 0; part < parts; ++part)
-        for (std::size_t i = 0; i < gauss_.nodes.size(); ++i)
-          sum += half * gauss_.weights[i] *
-                 std::polar(1.0, phase(x, piece.low + half * (2 * part + 1 + gauss_.nodes[i])));
-    }
-    return sum;
-  };
-
-  // A sine's map takes the roots at the ends of a panel away.
-  const double waves = std::abs(defocus_m + curvature_m_) / wavelength_m;
-  const int parts = (lens_.spider_vanes > 0 ? 40 : 4) + static_cast<int>(0.5 * waves);
-  const std::vector<double> corners = overlap_corners(shift, lens_.obscuration);
+  const double w20_m = defocus_m + curvature_m_;
+  const Shift shift{2.0 * nu,       turn,  std::cos(turn),
+                    std::sin(turn), per_m, 4.0 * per_m * w20_m * nu};
+  // A spider's edges need finer parts, and much defocus does.
+  const int parts =
+      (lens_.spider_vanes > 0 ? 40 : 4) + static_cast<int>(0.5 * std::abs(w20_m) / wavelength_m);
+  const std::vector<double> corners = overlap_corners(shift.length, lens_.obscuration);
   std::complex<double> sum = 0;
   for (std::size_t panel = 0; panel + 1 < corners.size(); ++panel) {
     const double middle = 0.5 * (corners[panel] + corners[panel + 1]);
     const double half = 0.5 * (corners[panel + 1] - corners[panel]);
     for (int part = 0; part < parts; ++part) {
       for (std::size_t i = 0; i < gauss_.nodes.size(); ++i) {
+        // A sine's map takes the roots at the panel's ends away.
         const double t = 0.5 * kPi * ((2 * part + 1 + gauss_.nodes[i]) / parts - 1.0);
         const double weight = half * 0.5 * kPi / parts * gauss_.weights[i] * std::cos(t);
         const double x = middle + half * std::sin(t);
-        sum += weight * (across(x) + across(-x));
+        sum += weight * (across(shift, x) + across(shift, -x));
       }
     }
   }

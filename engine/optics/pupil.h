@@ -85,6 +85,21 @@ class Pupil {
                                          double defocus_m) const;
 
  private:
+  /// The pupil twice, at +-length/2 along x, the frame turned so; phases per metre of path, and of
+  /// defocus per unit of x.
+  struct Shift {
+    double length;
+    double turn_rad;
+    double cosine;
+    double sine;
+    double per_m;
+    double curvature;
+  };
+  /// By how much the first of the two is ahead in the overlap, and its integral along the line at
+  /// x.
+  [[nodiscard]] double phase(const Shift& shift, double x, double y) const noexcept;
+  [[nodiscard]] std::complex<double> across(const Shift& shift, double x) const noexcept;
+
   LensSpec lens_;
   std::vector<ZernikeTerm> terms_;  ///< those of the same turns and kind are one
   double curvature_m_;
