@@ -84,6 +84,7 @@ FrameReport ImagingChain::expose(const Shot& shot, Budget budget, DnImage& out,
   const Duration built = now();
   radiance_.earth.draw(snapshot.earth_in_frame, snapshot.background_w_m2_sr);
   report.render = renderer_->render(snapshot, budget, radiance_);
+  radiance_.range_m = snapshot.range_m;
   const Duration rendered = now();
   const bool mixed = radiance_.companions_in_sight;
   if (mixed) measure_past_companions(shot.exposure, report.truth, mask);
@@ -91,8 +92,9 @@ FrameReport ImagingChain::expose(const Shot& shot, Budget budget, DnImage& out,
   if (!mixed) measure_light(report.optics.window, shot.exposure, report.truth, mask);
   // What was measured is the target's light: the stars come after.
   if (stars_ != nullptr)
-    report.stars = stars_->add(snapshot, radiance_,
-                               radiance_.uniform_w_m2_sr * optics_.throughput_sr(), irradiance_);
+    report.stars =
+        stars_->add(snapshot, radiance_, radiance_.uniform_w_m2_sr * optics_.throughput_sr(),
+                    optics_.star_defocus_m(snapshot.range_m), irradiance_);
   const Duration projected = now();
   detector_.expose(irradiance_, shot.exposure, snapshot.seed, shot.sequence, electrons_);
   detector_.digitize(electrons_, snapshot.seed, shot.sequence, out);

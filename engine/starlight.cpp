@@ -33,7 +33,7 @@ Starlight::Starlight(StarField field, PointSplat& splat, const DetectorSpec& det
 }
 
 StarReport Starlight::add(const Snapshot& snapshot, const Radiance& in, double background_w_m2,
-                          IrradianceImage& out) noexcept {
+                          double defocus_m, IrradianceImage& out) noexcept {
   const double to_e = detector_.electrons_per_irradiance(snapshot.exposure);
   const double dark_e = background_w_m2 * to_e + detector_.dark_e_s * seconds(snapshot.exposure);
   const double e_per_w_m2 = splat_.pixels_per_irradiance() * to_e;
@@ -53,6 +53,7 @@ StarReport Starlight::add(const Snapshot& snapshot, const Radiance& in, double b
     if (free < 1.0) ++report.dimmed;
     star.irradiance_w_m2 *= free;
   }
+  splat_.focus(defocus_m);
   report.lost_flux_share = splat_.add(drawn_, out).lost_flux_share;
   report.near = found.near;
   report.drawn = found.drawn;

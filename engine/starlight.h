@@ -41,9 +41,9 @@ class Starlight {
   Starlight(StarField field, PointSplat& splat, const DetectorSpec& detector);
 
   /// Adds the stars to `out`, the blurred image of all else. `in` is what the target's image was
-  /// made of.
+  /// made of; `defocus_m` is W20 of the stars.
   StarReport add(const Snapshot& snapshot, const Radiance& in, double background_w_m2,
-                 IrradianceImage& out) noexcept;
+                 double defocus_m, IrradianceImage& out) noexcept;
 
  private:
   StarField field_;

@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "engine/core/constants.h"
+#include "engine/core/number_table.h"
 #include "engine/core/random.h"
-#include "hil/number_table.h"
 
 namespace hil {
 
@@ -50,8 +50,8 @@ double power_of(const std::vector<JitterDensity>& densities, std::size_t axis) {
 }
 
 std::vector<JitterDensity> read_densities(const std::string& path) {
-  const NumberTable table =
-      read_number_table(path, "frequency_hz,x_rad2_hz,y_rad2_hz", kMostDensities);
+  const engine::NumberTable table =
+      engine::read_number_table(path, "frequency_hz,x_rad2_hz,y_rad2_hz", kMostDensities);
   std::vector<JitterDensity> densities;
   std::array<double, 2> power{};
   for (const auto& [line, v] : table.rows) {
@@ -73,7 +73,8 @@ std::vector<JitterDensity> read_densities(const std::string& path) {
 }
 
 std::vector<JitterSample> read_samples(const std::string& path) {
-  const NumberTable table = read_number_table(path, "t_s,x_urad,y_urad", kMostSamples);
+  const engine::NumberTable table =
+      engine::read_number_table(path, "t_s,x_urad,y_urad", kMostSamples);
   std::vector<JitterSample> samples;
   for (const auto& [line, v] : table.rows) {
     if (!samples.empty() && v[0] <= samples.back().time_s)

@@ -38,7 +38,8 @@ Blur::Blur(int longest, int step, WorkerPool& pool) : step_(step), pool_(pool) {
     if (step > 1) lengths.push_back(n * step);
     if (n >= longest) break;
   }
-  const int side = lengths.back() / step * step;  // in cells
+  const int side = lengths.back();
+  longest_ = side;
   const int samples = side / step;
   const int shares = pool.threads() * 2;
   for (int i = 0; i < shares; ++i) lines_.emplace_back(lengths);
@@ -63,6 +64,7 @@ void Blur::share(int count, const Work& work) noexcept {
 
 void Blur::transform(const RadianceImage& picture, const Grid& grid, const GridOtf& otf) noexcept {
   const int rows = (picture.height() + Lanes::kCount - 1) / Lanes::kCount * Lanes::kCount;
+  ENSURE(grid.width <= longest_ && grid.height <= longest_);
   ENSURE(grid.left >= 0 && grid.left + picture.width() <= grid.width);
   ENSURE(grid.top >= 0 && grid.top + rows <= grid.height);
   grid_ = grid;

@@ -57,6 +57,7 @@ class Blur {
   }
 
   int step_;
+  int longest_ = 0;  ///< side of a grid, in cells
   WorkerPool& pool_;
   Grid grid_;
   int columns_ = 0;  ///< of the half spectrum, up to the cutoff

@@ -13,6 +13,9 @@ constexpr int kCell = FarWings::kCell_px;
 constexpr int kTableSteps = 1024;
 // Cells beside the outermost pixel that its interpolation looks at.
 constexpr int kBeside = 2;
+// Along a side, than pixels would have it: halves of cells at either end, and what the transform's
+// rows and the interpolation look at.
+constexpr int kMoreCells = 16;
 
 std::size_t at(int i) noexcept { return static_cast<std::size_t>(i); }
 
@@ -29,12 +32,12 @@ constexpr std::array<float, 4> kCubic{-0.0390625F, 0.2734375F, 0.8203125F, -0.05
 
 FarWings::FarWings(const WingLaw& law, double width, int longest_px, WorkerPool& pool)
     : pool_(pool),
-      grid_otf_(kCell, 2, Blur::fast_length(longest_px / kCell)),
-      blur_(longest_px / kCell, 1, pool),
+      grid_otf_(kCell, 2, Blur::fast_length(longest_px / kCell + kMoreCells)),
+      blur_(longest_px / kCell + kMoreCells, 1, pool),
       softness_px_{5.0 * width, 7.0 * width},
       table_(kTableSteps + 2, 0.0F),
-      line_(at(longest_px / kCell + 4)),
-      wide_(at(Blur::fast_length(longest_px / kCell)) * at(longest_px)) {
+      line_(at(longest_px / kCell + kMoreCells)),
+      wide_(at(Blur::fast_length(longest_px / kCell + kMoreCells)) * at(longest_px)) {
   // The two together have the law's share, and its next term: that of c / (r^2 + s^2)^(3/2) is
   // - 3/2 c s^2 / r^5.
   const double s0 = softness_px_[0] * softness_px_[0];
@@ -45,8 +48,10 @@ FarWings::FarWings(const WingLaw& law, double width, int longest_px, WorkerPool&
                2.0 * kPi * (law.share_px - first) / softness_px_[1]};
   for (int i = 0; i <= kTableSteps; ++i)
     table_[at(i)] = static_cast<float>(otf(static_cast<double>(i) / kTableSteps / kCell));
-  cells_.reserve(longest_px / kCell, longest_px / kCell);
+  cells_.reserve(longest_px / kCell + kMoreCells, longest_px / kCell + kMoreCells);
 }
+
+RadialOtf FarWings::table() const noexcept { return {table_, 1.0 * kTableSteps * kCell}; }
 
 double FarWings::otf(double per_px) const noexcept {
   double sum = 0;
@@ -104,7 +109,7 @@ void FarWings::transform(int reach_px, PixelPoint smear_px) noexcept {
   grid.top = margin_y_;
   grid.width = Blur::fast_length(cells_.width() + 2 * margin_x_);
   grid.height = Blur::fast_length(cells_.height() + 2 * margin_y_ + Lanes::kCount);
-  grid_otf_.prepare(grid.height, {table_, 1.0 * kTableSteps * kCell}, smear_px);
+  grid_otf_.prepare(table(), grid.height, smear_px);
   blur_.transform(cells_, grid, grid_otf_);
 }
 

@@ -34,6 +34,7 @@ class FarWings {
 
   /// What the fine grid need not spread: in cycles per pixel.
   [[nodiscard]] double otf(double per_px) const noexcept;
+  [[nodiscard]] RadialOtf table() const noexcept;  ///< of it, up to the cells' own limit
 
   /// Takes the light in: `picture` in cells of 1/oversampling px, the first at the corner of
   /// pixel (region.left, region.top).

@@ -25,10 +25,20 @@ double GridOtf::pixel_factor(double per_px) const noexcept {
   return sinc(per_px) / cell;
 }
 
-double GridOtf::cutoff() const noexcept { return radial_.cutoff_per_px() * cell_px_; }
-
-void GridOtf::prepare(int height, const RadialOtf& radial, PixelPoint smear_px) noexcept {
+void GridOtf::prepare(const RadialOtf& radial, int height, PixelPoint smear_px) noexcept {
   radial_ = radial;
+  directed_.reset();
+  cutoff_per_px_ = radial.cutoff_per_px();
+  prepare_rows(height, smear_px);
+}
+
+void GridOtf::prepare(const DirectedOtf& directed, int height, PixelPoint smear_px) noexcept {
+  directed_.emplace(directed);
+  cutoff_per_px_ = directed.cascade.cutoff_per_px();
+  prepare_rows(height, smear_px);
+}
+
+void GridOtf::prepare_rows(int height, PixelPoint smear_px) noexcept {
   smear_px_ = smear_px;
   smears_ = std::hypot(smear_px.u, smear_px.v) > kUnseenSmear_px;
   for (int k = 0; k < height; ++k) {
@@ -40,6 +50,24 @@ void GridOtf::prepare(int height, const RadialOtf& radial, PixelPoint smear_px) 
         static_cast<float>(turns), static_cast<float>(std::sin(kPi * turns)),
         static_cast<float>(std::cos(kPi * turns))};
   }
+}
+
+GridOtf::Complex GridOtf::unmoved(const Lanes& fu, float fv) const noexcept {
+  Lanes re;
+  Lanes im;
+  for (int c = 0; c < Lanes::kCount; ++c) {
+    const float f = std::sqrt(fu.v[c] * fu.v[c] + fv * fv);
+    if (!directed_) {
+      re.v[c] = radial_.at(f);
+      continue;
+    }
+    const auto value = directed_->cascade.at(static_cast<double>(fu.v[c]), static_cast<double>(fv),
+                                             directed_->lens);
+    const float less = directed_->less.table.empty() ? 0.0F : directed_->less.at(f);
+    re.v[c] = static_cast<float>(value.real()) - less;
+    im.v[c] = static_cast<float>(value.imag());
+  }
+  return {re, im};
 }
 
 void GridOtf::fill_column(const Lanes& fx, std::span<Complex> out) const noexcept {
@@ -58,29 +86,18 @@ void GridOtf::fill_column(const Lanes& fx, std::span<Complex> out) const noexcep
     sine.v[c] = static_cast<float>(std::sin(kPi * t));
     cosine.v[c] = static_cast<float>(std::cos(kPi * t));
   }
-  const Lanes square = per_px * per_px;
-  const auto steps = static_cast<float>(radial_.steps_per_frequency);
-  const auto last = static_cast<float>(radial_.table.size() - 2);
   for (std::size_t k = 0; k < out.size(); ++k) {
     const Row& row = rows_[k];
-    const Lanes f2 = square + Lanes(row.per_px * row.per_px);
-    Lanes value;
-    for (int c = 0; c < kLanes; ++c) {
-      const float place = std::min(std::sqrt(f2.v[c]) * steps, last);
-      const auto low = static_cast<std::size_t>(place);
-      const float part = place - static_cast<float>(low);
-      value.v[c] = (1.0F - part) * radial_.table[low] + part * radial_.table[low + 1];
-    }
-    value *= pixel * Lanes(row.pixel);
+    Lanes factor = pixel * Lanes(row.pixel);
     if (smears_) {
       const Lanes x = turns + Lanes(row.smear);
       const Lanes wave = sine * Lanes(row.cosine) + cosine * Lanes(row.sine);
       const Lanes p = Lanes(static_cast<float>(kPi)) * x;
       const Lanes series = Lanes(1.0F) - p * p * Lanes(1.0F / 6.0F);
       for (int c = 0; c < kLanes; ++c)
-        value.v[c] *= std::abs(x.v[c]) < kFewTurns ? series.v[c] : wave.v[c] / p.v[c];
+        factor.v[c] *= std::abs(x.v[c]) < kFewTurns ? series.v[c] : wave.v[c] / p.v[c];
     }
-    out[k] = Complex(value, Lanes{});
+    out[k] = unmoved(per_px, row.per_px) * factor;
   }
 }
 

@@ -1,10 +1,13 @@
 #pragma once
 
+#include <algorithm>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "engine/core/image.h"
 #include "engine/optics/fourier.h"
+#include "engine/optics/otf_cascade.h"
 
 namespace engine {
 
@@ -16,10 +19,24 @@ struct RadialOtf {
   [[nodiscard]] double cutoff_per_px() const noexcept {
     return static_cast<double>(table.size() - 2) / steps_per_frequency;
   }
+  [[nodiscard]] float at(float per_px) const noexcept {
+    const float place = std::min(per_px * static_cast<float>(steps_per_frequency),
+                                 static_cast<float>(table.size() - 2));
+    const auto low = static_cast<std::size_t>(place);
+    const float part = place - static_cast<float>(low);
+    return (1.0F - part) * table[low] + part * table[low + 1];
+  }
 };
 
-/// The product of an image's OTFs at the frequencies of a grid: a radial one, the pixel's square,
-/// and a straight smear. A cell of the grid is itself an average; that is taken back out.
+/// An OTF that depends on the direction, too: a cascade's, less a radial one.
+struct DirectedOtf {
+  const OtfCascade& cascade;
+  const OtfCascade::Focused& lens;
+  RadialOtf less;  ///< an empty table: nothing less
+};
+
+/// The product of an image's OTFs at the frequencies of a grid: one of the two above, the pixel's
+/// square, and a straight smear. A cell of the grid is itself an average; that is taken back out.
 /// Thread: loop; fill_column() any. Loop-safe but for the constructor.
 class GridOtf {
  public:
@@ -30,11 +47,13 @@ class GridOtf {
   /// cells along a side of the grid, at most.
   GridOtf(double cell_px, int averages, int longest);
 
-  /// For grids of this height in cells. `radial` is looked at until the next call.
-  void prepare(int height, const RadialOtf& radial, PixelPoint smear_px) noexcept;
+  /// For grids of this height in cells. What the first argument names is looked at until the next
+  /// call.
+  void prepare(const RadialOtf& radial, int height, PixelPoint smear_px) noexcept;
+  void prepare(const DirectedOtf& directed, int height, PixelPoint smear_px) noexcept;
 
   /// Cycles per cell beyond which it is 0.
-  [[nodiscard]] double cutoff() const noexcept;
+  [[nodiscard]] double cutoff() const noexcept { return cutoff_per_px_ * cell_px_; }
   /// At horizontal frequencies `fx`, in cycles per cell, and at the vertical ones k / height, for
   /// k from 0 on; from half the height on, that less 1.
   void fill_column(const Lanes& fx, std::span<Complex> out) const noexcept;
@@ -49,10 +68,14 @@ class GridOtf {
     float cosine = 1;
   };
   [[nodiscard]] double pixel_factor(double per_px) const noexcept;
+  void prepare_rows(int height, PixelPoint smear_px) noexcept;
+  [[nodiscard]] Complex unmoved(const Lanes& fu, float fv) const noexcept;
 
   double cell_px_;
   int averages_;
-  RadialOtf radial_;
+  double cutoff_per_px_ = 0;
+  RadialOtf radial_;  ///< or, of a directed one, what it is less
+  std::optional<DirectedOtf> directed_;
   PixelPoint smear_px_;
   bool smears_ = false;
   std::vector<Row> rows_;

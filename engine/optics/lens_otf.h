@@ -53,6 +53,8 @@ class LensOtf {
   [[nodiscard]] double cutoff_per_m() const noexcept { return cutoff_per_m_; }
   /// Neither spider nor wavefront errors but z4, z11, z22, z37: real, and depends on |f| alone.
   [[nodiscard]] bool radial() const noexcept { return radial_; }
+  /// Defocus of either sign does the same.
+  [[nodiscard]] bool even() const noexcept { return even_ && curvature_m_ == 0.0; }
   /// Not if no defocus was asked for.
   [[nodiscard]] bool changes_with_defocus() const noexcept { return largest_defocus_m_ > 0.0; }
   /// What the tables carry: what was asked for, but no more than 16 waves of the shortest

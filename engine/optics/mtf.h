@@ -1,7 +1,5 @@
 #pragma once
 
-#include <vector>
-
 namespace engine {
 
 /// Transfer functions of the image. Frequencies in cycles per pixel or per metre as named; all are
@@ -25,26 +23,5 @@ namespace engine {
 
 /// Random jitter of this rms along one axis.
 [[nodiscard]] double jitter_otf(double frequency, double rms) noexcept;
-
-/// Diffraction over a band that is flat in photons, tabulated by frequency in cycles per metre.
-/// Five Gauss-Legendre wavelengths: within 1e-3 of 41.
-class BandOtf {
- public:
-  struct Spec {
-    double focal_length_m = 4.5;
-    double aperture_m = 0.36;
-    double obscuration = 0;  ///< diameter ratio
-    double band_low_m = 450e-9;
-    double band_high_m = 850e-9;
-  };
-  explicit BandOtf(const Spec& spec);
-
-  [[nodiscard]] double cutoff_per_m() const noexcept { return cutoff_per_m_; }
-  [[nodiscard]] double at(double frequency_per_m) const noexcept;
-
- private:
-  double cutoff_per_m_;
-  std::vector<float> table_;
-};
 
 }  // namespace engine

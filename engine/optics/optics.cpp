@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "engine/core/constants.h"
+#include "engine/optics/pupil.h"
 
 namespace engine {
 namespace {
@@ -23,6 +25,8 @@ constexpr double kLongestSmear_px = 1e6;
 constexpr double kBright = 1e6;
 constexpr std::size_t kMostBright = 256;
 constexpr int kTableSteps = 4096;
+// Of a defocus: a change that keeps the tables, a thousandth of what it does to the OTF.
+constexpr double kSameFocus = 5e-4;
 
 /// The largest, whatever its sign.
 double most_of(std::span<const float> light) noexcept {
@@ -36,8 +40,19 @@ std::size_t at(int i) noexcept { return static_cast<std::size_t>(i); }
 /// How wide the image of a point is against that of the paper's camera, for which the fine grid's
 /// reach and the softness of FarWings are chosen; not less than 1.
 double width_of_point(const OpticsSpec& spec) noexcept {
-  const double f_number = spec.band.focal_length_m / spec.band.aperture_m;
+  const double f_number = spec.lens.focal_length_m / spec.lens.aperture_m;
   return std::max(1.0, middle_wavelength_m(spec) * f_number / spec.camera.pixel_pitch_m / 1.25);
+}
+
+/// How far geometry sends light astray: by defocus, by the steepest wavefront, and by what shakes.
+double defocus_blur_px(const OpticsSpec& spec, double defocus_m) noexcept {
+  const double f_number = spec.lens.focal_length_m / spec.lens.aperture_m;
+  return 4.0 * f_number * std::abs(defocus_m) / spec.camera.pixel_pitch_m;
+}
+double still_blur_px(const OpticsSpec& spec) noexcept {
+  const double f_number = spec.lens.focal_length_m / spec.lens.aperture_m;
+  return 2.0 * f_number * Pupil(spec.lens).steepest_m() / spec.camera.pixel_pitch_m +
+         (3.0 * spec.jitter_rad + spec.vibration.amplitude_rad) / spec.camera.ifov_rad();
 }
 
 /// The closed form near zero frequency, 1 - 4/pi (nu - nu^3 / 6) for a full disc, averaged over the
@@ -45,11 +60,11 @@ double width_of_point(const OpticsSpec& spec) noexcept {
 /// they begin far out adds none to the cubes.
 WingLaw wing_law_of(const OpticsSpec& spec) noexcept {
   constexpr double kSmallHole = 0.2;
-  const double hole = spec.band.obscuration;
+  const double hole = spec.lens.obscuration;
   const double to_px =
-      spec.band.focal_length_m / (spec.band.aperture_m * spec.camera.pixel_pitch_m);
-  const double low = spec.band.band_low_m * to_px;
-  const double high = spec.band.band_high_m * to_px;
+      spec.lens.focal_length_m / (spec.lens.aperture_m * spec.camera.pixel_pitch_m);
+  const double low = spec.lens.band_low_m * to_px;
+  const double high = spec.lens.band_high_m * to_px;
   const double mean_cube = (high * high + low * low) * (high + low) / 4.0;
   const double rims = hole > kSmallHole ? (1.0 + 1.0 / hole) / (1.0 - hole * hole) : 1.0;
   // c / r^3 has the cone - 4 pi^2 c f, and c / r^5 the cube 16 pi^4 / 9 c f^3.
@@ -61,8 +76,10 @@ WingLaw wing_law_of(const OpticsSpec& spec) noexcept {
 
 Optics::Optics(const OpticsSpec& spec, double faint_w_m2, WorkerPool& pool)
     : spec_(spec),
-      diffraction_(spec.band),
+      cascade_(spec),
+      focused_(cascade_.focused(0.0)),
       wing_law_(wing_law_of(spec)),
+      still_blur_px_(still_blur_px(spec)),
       throughput_sr_(engine::throughput_sr(spec)),
       faint_w_m2_(faint_w_m2),
       pool_(pool),
@@ -71,18 +88,11 @@ Optics::Optics(const OpticsSpec& spec, double faint_w_m2, WorkerPool& pool)
       core_otf_(1.0 / kOversampling, 1,
                 kOversampling * Blur::fast_length(longest_px(spec) + 2 * kLargestCore_px)),
       least_core_px_(static_cast<int>(std::lround(kCore_px * width_of_point(spec)))),
-      splat_(std::make_unique<PointSplat>(spec, faint_w_m2, pool)),
-      cell_splat_(spec, faint_w_m2, pool, {1.0 / kOversampling, &wings_}),
+      splat_(std::make_unique<PointSplat>(spec, cascade_, faint_w_m2, pool)),
+      cell_splat_(spec, cascade_, faint_w_m2, pool, {1.0 / kOversampling, &wings_}),
       whole_table_(kTableSteps + 2),
       core_table_(kTableSteps + 2) {
-  const double pitch_m = spec.camera.pixel_pitch_m;
-  const double cutoff_per_px = diffraction_.cutoff_per_m() * pitch_m;
-  for (int i = 0; i < kTableSteps; ++i) {
-    const double per_px = cutoff_per_px * i / kTableSteps;
-    const double otf = diffraction_.at(per_px / pitch_m);
-    whole_table_[at(i)] = static_cast<float>(otf);
-    core_table_[at(i)] = static_cast<float>(otf - wings_.otf(per_px));
-  }
+  tabulate();
   const PixelRect most = spec.camera.frame().grown_by(wish().beyond_frame_px);
   net_.reserve(most.width() * kOversampling, most.height() * kOversampling);
   behind_.resize(at(most.width()) * at(most.height()));
@@ -103,18 +113,40 @@ GridWish Optics::wish() const noexcept {
 
 double Optics::noise_blur_px() const noexcept {
   constexpr int kSteps = 128;  // over a quarter of the plane; a thousandth off at 64
-  const double pitch_m = spec_.camera.pixel_pitch_m;
-  const double step = diffraction_.cutoff_per_m() * pitch_m / kSteps;  // cycles per pixel
+  const double step = cascade_.cutoff_per_px() / kSteps;
   double integral = 0;
   for (int i = 0; i < kSteps; ++i) {
-    for (int k = 0; k < kSteps; ++k) {
-      const double fx = (i + 0.5) * step;
-      const double fy = (k + 0.5) * step;
-      const double otf = diffraction_.at(std::hypot(fx, fy) / pitch_m) * sinc(fx) * sinc(fy);
-      integral += 4.0 * step * step * otf * otf;
-    }
+    for (int k = -kSteps; k < kSteps; ++k)
+      integral += 2.0 * step * step *
+                  std::norm(cascade_.whole((i + 0.5) * step, (k + 0.5) * step, focused_));
   }
   return std::sqrt(1.0 / (4.0 * kPi * integral));
+}
+
+void Optics::tabulate() noexcept {
+  if (!cascade_.radial()) return;
+  const double step = cascade_.cutoff_per_px() / kTableSteps;
+  for (int i = 0; i < kTableSteps; ++i) {
+    const double otf = cascade_.at_radial(i * step, focused_);
+    whole_table_[at(i)] = static_cast<float>(otf);
+    core_table_[at(i)] = static_cast<float>(otf - wings_.otf(i * step));
+  }
+}
+
+double Optics::star_defocus_m(double target_range_m) const noexcept {
+  return cascade_.seen_defocus_m(
+      spec_.defocus_m(std::numeric_limits<double>::infinity(), target_range_m));
+}
+
+/// Where the target is, if it is not where it was.
+void Optics::focus(double defocus_m) noexcept {
+  const double seen_m = cascade_.seen_defocus_m(defocus_m);
+  // A change that nobody sees keeps the tables.
+  if (std::abs(seen_m - defocus_m_) <= kSameFocus * std::abs(seen_m)) return;
+  defocus_m_ = seen_m;
+  cascade_.focus(seen_m, focused_);
+  tabulate();
+  cell_splat_.focus(seen_m);
 }
 
 OpticsReport Optics::project(const Radiance& in, IrradianceImage& out) noexcept {
@@ -123,10 +155,16 @@ OpticsReport Optics::project(const Radiance& in, IrradianceImage& out) noexcept 
   OpticsReport report;
   if (in.region.empty()) return report;
 
+  focus(spec_.defocus_m(in.range_m, in.range_m));
+  splat_->focus(defocus_m_);
+  report.defocus_m = defocus_m_;
   const double flux = flux_of(in);
-  report.wing_px =
-      static_cast<int>(std::clamp(std::ceil(std::cbrt(wing_law_.share_px * flux / faint_w_m2_)),
-                                  1.0 * kSmallestCore_px, 1.0 * spec_.largest_wing_px));
+  const int blur_px =
+      static_cast<int>(std::ceil(still_blur_px_ + defocus_blur_px(spec_, defocus_m_)));
+  const double least_px = kSmallestCore_px + blur_px;
+  const double wing_px = std::ceil(std::cbrt(wing_law_.share_px * flux / faint_w_m2_));
+  report.wing_px = static_cast<int>(
+      std::clamp(wing_px, least_px, std::max(1.0 * spec_.largest_wing_px, least_px)));
   report.lost_flux_share = 2.0 * kPi * wing_law_.share_px / report.wing_px;
 
   const double length_px = std::max(std::abs(in.motion_px.u), std::abs(in.motion_px.v));
@@ -141,7 +179,7 @@ OpticsReport Optics::project(const Radiance& in, IrradianceImage& out) noexcept 
   report.points = static_cast<int>(points_.size() + bright_.size());
   const double brightest = most_of(light.pixels());
   if (brightest > 0.0 || !bright_.empty())
-    spread_grid(light, in.region, brightest, smear, report, out);
+    spread_grid(light, in.region, brightest, blur_px, smear, report, out);
   splat_->add(points_, out, report.wing_px);
   cell_splat_.add(bright_, out);
   const auto margin = [&](double motion) {
@@ -233,19 +271,19 @@ const RadianceImage& Optics::take_bright_cells(const Radiance& in,
 
 /// Up to where the fine grid follows light when FarWings do the rest, which have no rings:
 /// `brightest` is the largest radiance, seen as far as two pixels about it.
-int Optics::core_margin(double brightest, int reach_px) const noexcept {
+int Optics::core_margin(double brightest, int blur_px, int reach_px) const noexcept {
   const double light = 4.0 * brightest * throughput_sr_;
   const double rings_px = std::cbrt(kRings * wing_law_.share_px * light / faint_w_m2_);
-  const int least = std::min(least_core_px_, kLargestCore_px);
-  return std::min(reach_px, static_cast<int>(std::clamp(std::ceil(rings_px), 1.0 * least,
-                                                        1.0 * kLargestCore_px)));
+  const double least_px = std::min(least_core_px_ + 2 * blur_px, kLargestCore_px);
+  const double px = spec_.lens.spider_vanes > 0 ? reach_px : std::ceil(rings_px);
+  return std::min(reach_px, static_cast<int>(std::clamp(px, least_px, 1.0 * kLargestCore_px)));
 }
 
 void Optics::spread_grid(const RadianceImage& light, const PixelRect& region, double brightest,
-                         const Smear& smear, OpticsReport& report, IrradianceImage& out) noexcept {
-  report.core_px = core_margin(brightest, report.wing_px);
-  const bool with_wings = report.core_px < report.wing_px;
-  const auto& table = with_wings ? core_table_ : whole_table_;
+                         int blur_px, const Smear& smear, OpticsReport& report,
+                         IrradianceImage& out) noexcept {
+  report.core_px = core_margin(brightest, blur_px, report.wing_px);
+  const bool with_wings = report.core_px < report.wing_px && spec_.lens.spider_vanes == 0;
   const PixelPoint piece = smear.piece_px();
   const auto margin = [&](double motion) {
     return report.core_px + static_cast<int>(std::ceil(std::abs(motion) / 2.0));
@@ -259,8 +297,13 @@ void Optics::spread_grid(const RadianceImage& light, const PixelRect& region, do
   // first cell of the region lies one before.
   const Blur::Grid grid{width_px * kOversampling, height_px * kOversampling,
                         margin(piece.u) * kOversampling - 1, margin(piece.v) * kOversampling - 1};
-  const double steps = kTableSteps / (diffraction_.cutoff_per_m() * spec_.camera.pixel_pitch_m);
-  core_otf_.prepare(grid.height, {table, steps}, piece);
+  if (cascade_.radial()) {
+    const auto& table = with_wings ? core_table_ : whole_table_;
+    core_otf_.prepare(RadialOtf{table, kTableSteps / cascade_.cutoff_per_px()}, grid.height, piece);
+  } else {
+    core_otf_.prepare(DirectedOtf{cascade_, focused_, with_wings ? wings_.table() : RadialOtf{}},
+                      grid.height, piece);
+  }
   core_.transform(light, grid, core_otf_);
   if (with_wings) wings_.transform(report.wing_px, piece);
   report.segments = smear.pieces;

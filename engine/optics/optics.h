@@ -7,8 +7,8 @@
 #include "engine/optics/blur.h"
 #include "engine/optics/far_wings.h"
 #include "engine/optics/grid_otf.h"
-#include "engine/optics/mtf.h"
 #include "engine/optics/optics_spec.h"
+#include "engine/optics/otf_cascade.h"
 #include "engine/optics/point_splat.h"
 #include "engine/render/renderer.h"
 
@@ -22,22 +22,23 @@ struct OpticsReport {
   double lost_flux_share = 0;
   int points = 0;    ///< of light that were spread by table, bright cells of the grid among them
   int segments = 1;  ///< that a long smear was made of
+  double defocus_m = 0;  ///< W20 of the target, of path; one that nobody sees is 0
 };
 
 /// Throughput, then blur by the product of the component OTFs, before the pixels sample.
 ///
 /// L pi/4 (D/f)^2 tau, eq 15 of Li et al. 2023, on a grid of 3 cells to a pixel's side: the optics
 /// pass 178 lp/mm where the pixels end at 77, so a product of MTFs on the pixel grid is 13 % wrong.
-/// Terms: diffraction over the band, the pixel's square, linear smear. A cell is itself a square
-/// average, and the product takes that back out: diffraction, pixel and smear are exact.
-/// The spread of light is followed to where it drops under `faint_w_m2` (rule B5), or to
-/// largest_wing_px: near by on the fine grid, further out as FarWings. Points, and cells so bright
-/// that single precision would show their rounding all over the window, go by PointSplat. A smear
-/// longer than a window is made of segments, each sampled from the same transform.
-/// The Earth behind the target is not blurred but for the pixels that the target
-/// hides of it: a spread of sigma px adds sigma^2 / 2 times the second derivative, 1e-8 of its
-/// light in the paper's camera, 1e-3 in one of 20 deg at the limb; a limb sharper than a pixel
-/// stays so. Leaves out: defocus, wavefront error, vibration, distortion, vignetting. Thread: loop.
+/// Terms: OtfCascade, the target out of focus by its own range, and linear smear. A cell is itself
+/// a square average, and the product takes that back out. The spread of light is followed to where
+/// it drops under `faint_w_m2` (rule B5), or to largest_wing_px: near by on the fine grid, further
+/// out as FarWings. Points, and cells so bright that single precision would show their rounding all
+/// over the window, go by PointSplat. A smear longer than a window is made of segments, each
+/// sampled from the same transform. The Earth behind the target is not blurred but for the pixels
+/// that the target hides of it: a spread of sigma px adds sigma^2 / 2 times the second derivative,
+/// 1e-8 of its light in the paper's camera, 1e-3 in one of 20 deg at the limb; a limb sharper than
+/// a pixel stays so. Leaves out: distortion, vignetting; of a spider's spikes what is beyond 64 px.
+/// Thread: loop.
 /// Loop-safe but for the constructor.
 class Optics {
  public:
@@ -50,6 +51,10 @@ class Optics {
   /// 1 / (4 pi sigma^2) is the integral of the squared OTF.
   [[nodiscard]] double noise_blur_px() const noexcept;
 
+  /// W20 of the stars when the target is so far away.
+  [[nodiscard]] double star_defocus_m(double target_range_m) const noexcept;
+  /// All that blurs but motion, and the lens as it was last focused.
+  [[nodiscard]] const OtfCascade& cascade() const noexcept { return cascade_; }
   /// What spreads points of light as this does.
   [[nodiscard]] PointSplat& splat() noexcept { return *splat_; }
 
@@ -73,20 +78,26 @@ class Optics {
     }
   };
 
+  void tabulate() noexcept;
+  void focus(double defocus_m) noexcept;
   void fill_background(const Radiance& in, IrradianceImage& out) noexcept;
   const RadianceImage& net_light(const Radiance& in) noexcept;
   [[nodiscard]] double flux_of(const Radiance& in) const noexcept;
   const RadianceImage& take_bright_cells(const Radiance& in, const RadianceImage& light) noexcept;
-  [[nodiscard]] int core_margin(double brightest, int reach_px) const noexcept;
+  [[nodiscard]] int core_margin(double brightest, int blur_px, int reach_px) const noexcept;
   [[nodiscard]] static int longest_px(const OpticsSpec& spec) noexcept;
   void spread_grid(const RadianceImage& light, const PixelRect& region, double brightest,
-                   const Smear& smear, OpticsReport& report, IrradianceImage& out) noexcept;
+                   int blur_px, const Smear& smear, OpticsReport& report,
+                   IrradianceImage& out) noexcept;
   void add_core(const PixelRect& grid_px, PixelPoint move_px, int pieces,
                 IrradianceImage& out) noexcept;
 
   OpticsSpec spec_;
-  BandOtf diffraction_;
+  OtfCascade cascade_;
+  OtfCascade::Focused focused_;
+  double defocus_m_ = 0;  ///< of the target
   WingLaw wing_law_;
+  double still_blur_px_;
   double throughput_sr_;
   double faint_w_m2_;
   WorkerPool& pool_;

@@ -1,27 +1,77 @@
 #include "engine/optics/optics_spec.h"
 
-#include <string>
+#include <algorithm>
+#include <cmath>
 
 #include "engine/core/constants.h"
+#include "engine/core/number_table.h"
 
 namespace engine {
 namespace {
 
 constexpr int kSmallestWing_px = 8;
+constexpr std::size_t kMostTableRows = 10000;
+
+void read_focus(const ConfigTable& table, OpticsSpec& spec) {
+  spec.focus = table.choice_or<Focus>(
+      "focus", "target",
+      {{"target", Focus::kTarget}, {"infinity", Focus::kInfinity}, {"distance", Focus::kDistance}});
+  if (spec.focus == Focus::kDistance)
+    spec.focus_range_m = table.number("focus_km", positive()) * 1e3;
+}
 
 }  // namespace
+
+double MtfTable::at(double frequency_per_m) const noexcept {
+  if (per_m.empty()) return 1.0;
+  const double f = std::abs(frequency_per_m);
+  const auto next = std::ranges::upper_bound(per_m, f);
+  if (next == per_m.end()) return value.back();
+  const auto i = static_cast<std::size_t>(next - per_m.begin());
+  const double part = (f - per_m[i - 1]) / (per_m[i] - per_m[i - 1]);
+  return (1.0 - part) * value[i - 1] + part * value[i];
+}
+
+MtfTable read_mtf_table(const std::string& path) {
+  const NumberTable file = read_number_table(path, "frequency_lp_mm,mtf", kMostTableRows);
+  MtfTable table;
+  for (const auto& [line, v] : file.rows) {
+    if (table.per_m.empty() && (v[0] != 0.0 || v[1] != 1.0))
+      file.fail(line, "the first row must be 0,1: what does not vary is not blurred");
+    if (!table.per_m.empty() && v[0] * 1e3 <= table.per_m.back())
+      file.fail(line, "frequencies must grow from row to row");
+    if (v[1] < -1.0 || v[1] > 1.0) file.fail(line, "an MTF must be in [-1, 1]");
+    table.per_m.push_back(v[0] * 1e3);
+    table.value.push_back(v[1]);
+  }
+  if (table.per_m.size() < 2) file.fail(1, "an MTF needs two rows at least");
+  return table;
+}
+
+double OpticsSpec::defocus_m(double range_m, double target_range_m) const noexcept {
+  return engine::defocus_m(lens, range_m, focus == Focus::kTarget ? target_range_m : focus_range_m);
+}
 
 OpticsSpec read_optics(const ConfigTable& table, const CameraGeometry& camera) {
   OpticsSpec spec;
   spec.camera = camera;
-  spec.band.focal_length_m = camera.focal_length_m;
-  spec.band.aperture_m = table.number("aperture_m", positive());
-  spec.band.obscuration = table.number_or("obscuration", 0.0, from_below(0.0, 1.0));
+  spec.lens = read_lens(table, camera);
   spec.transmission = table.number("transmission", between(1e-6, 1.0));
+  read_focus(table, spec);
+  // Of more than this nothing is left to see, and the tables below would not hold its image.
+  const double most_rad = 10.0 * camera.ifov_rad();
+  const auto angle = [&](const std::string& key) {
+    return 1e-6 * table.number_or(key, 0.0, between(0.0, most_rad * 1e6));
+  };
+  spec.jitter_rad = angle("jitter_urad");
+  spec.vibration.amplitude_rad = angle("vibration_urad");
+  spec.vibration.direction_rad =
+      table.number_or("vibration_direction_deg", 0.0, any_number()) * kDegree;
+  if (table.has("mtf_file")) spec.mtf = read_mtf_table(table.text("mtf_file"));
   spec.largest_wing_px =
       static_cast<int>(table.integer_or("largest_wing_px", 256, between(kSmallestWing_px, 512)));
   const double cells_per_m = 3.0 / camera.pixel_pitch_m;
-  const double cutoff_per_m = spec.band.aperture_m / (camera.focal_length_m * spec.band.band_low_m);
+  const double cutoff_per_m = spec.lens.aperture_m / (camera.focal_length_m * spec.lens.band_low_m);
   if (cutoff_per_m > 0.5 * cells_per_m) {
     table.fail("aperture_m", "passes " + std::to_string(cutoff_per_m * 1e-3) +
                                  " lp/mm, more than the " + std::to_string(0.5e-3 * cells_per_m) +
@@ -31,9 +81,8 @@ OpticsSpec read_optics(const ConfigTable& table, const CameraGeometry& camera) {
 }
 
 double throughput_sr(const OpticsSpec& spec) noexcept {
-  const double d_over_f = spec.band.aperture_m / spec.band.focal_length_m;
-  const double open = 1.0 - spec.band.obscuration * spec.band.obscuration;
-  return kPi / 4.0 * d_over_f * d_over_f * spec.transmission * open;
+  const double d_over_f = spec.lens.aperture_m / spec.lens.focal_length_m;
+  return kPi / 4.0 * d_over_f * d_over_f * spec.transmission * spec.lens.open_share();
 }
 
 }  // namespace engine

@@ -1,12 +1,13 @@
 #include "engine/optics/point_splat.h"
 
-#include <Eigen/Core>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "engine/core/constants.h"
+#include "engine/optics/mtf.h"
+#include "engine/optics/point_image.h"
 
 namespace engine {
 namespace {
@@ -15,35 +16,33 @@ constexpr int kBandRows = 64;  // that one thread takes at a time
 constexpr double kUnseenStreak_px = 1e-3;
 
 double airy_constant(const OpticsSpec& spec) {
-  const double wavelength_m = 0.5 * (spec.band.band_low_m + spec.band.band_high_m);
+  const double wavelength_m = 0.5 * (spec.lens.band_low_m + spec.lens.band_high_m);
   return wavelength_m * spec.camera.focal_length_m /
-         (spec.band.aperture_m * spec.camera.pixel_pitch_m * std::pow(kPi, 3) *
-          (1.0 - spec.band.obscuration));
+         (spec.lens.aperture_m * spec.camera.pixel_pitch_m * std::pow(kPi, 3) *
+          (1.0 - spec.lens.obscuration));
 }
 
-/// Shares of a point's light by displacement, on `places` points `step_px` apart along each axis,
-/// the first at no displacement: the cosine transform of the OTF over one quarter of the plane.
-Eigen::MatrixXd image_of_a_point(const BandOtf& diffraction, double pitch_m,
-                                 const PointSplat::Kind& kind, int places, double step_px) {
-  // Images repeat after so many pixels; half of that away from a neighbour 3e-8 of the light is
-  // left.
-  constexpr int kPeriod_px = 256;
-  const int waves = static_cast<int>(diffraction.cutoff_per_m() * pitch_m * kPeriod_px) + 1;
-  const auto square = [&](double f) { return sinc(f) / sinc(f * kind.mean_over_px); };
-  Eigen::MatrixXd cosines(places, waves);
-  Eigen::MatrixXd otf(waves, waves);
-  for (int k = 0; k < waves; ++k) {
-    const double f = static_cast<double>(k) / kPeriod_px;  // cycles per pixel
-    const double share = (k == 0 ? 1.0 : 2.0) / kPeriod_px;
-    for (int i = 0; i < places; ++i) cosines(i, k) = share * std::cos(2.0 * kPi * f * i * step_px);
-    for (int j = 0; j < waves; ++j) {
-      const double g = static_cast<double>(j) / kPeriod_px;
-      const double per_px = std::hypot(f, g);
-      const double apart = kind.wings != nullptr ? kind.wings->otf(per_px) : 0.0;
-      otf(k, j) = (diffraction.at(per_px / pitch_m) - apart) * square(f) * square(g);
-    }
-  }
-  return cosines * otf * cosines.transpose();
+// Between levels, in waves: of W20^2 where its sign does not matter.
+constexpr double kStepOfSquares = 0.045;
+constexpr double kStep = 1.0 / 24.0;
+// Nobody sees stars beside what is nearer than this.
+constexpr double kNearest_m = 1e3;
+
+/// The defocus that points may have, of either sign.
+struct DefocusRange {
+  double low_m = 0;
+  double high_m = 0;
+};
+DefocusRange defocus_range(const OpticsSpec& spec, const OtfCascade& cascade) noexcept {
+  const auto seen = [&](double range_m, double target_m) {
+    return cascade.seen_defocus_m(spec.defocus_m(range_m, target_m));
+  };
+  const double far = std::numeric_limits<double>::infinity();
+  DefocusRange range;
+  if (spec.stars) range.low_m = std::min(0.0, seen(far, kNearest_m));
+  if (spec.focus != Focus::kTarget) range.high_m = std::max(0.0, seen(kNearest_m, far));
+  const double most_m = PointSplat::kMostDefocus_waves * middle_wavelength_m(spec);
+  return {std::max(range.low_m, -most_m), std::min(range.high_m, most_m)};
 }
 
 /// Lagrange's cubic through four places -1, 0, 1, 2 at t in [0, 1).
@@ -74,47 +73,94 @@ struct PointSplat::Footprint {
   int reach_px;
 };
 
-PointSplat::PointSplat(const OpticsSpec& spec, double faint_w_m2, WorkerPool& pool,
-                       const Kind& kind)
+PointSplat::PointSplat(const OpticsSpec& spec, const OtfCascade& cascade, double faint_w_m2,
+                       WorkerPool& pool, const Kind& kind)
     : width_px_(spec.camera.width_px),
       height_px_(spec.camera.height_px),
-      core_px_(std::min(kCore_px, spec.largest_wing_px)),
+      core_px_(
+          std::min(spec.lens.spider_vanes > 0 ? kCoreOfSpider_px : kCore_px, spec.largest_wing_px)),
       stride_((2 * core_px_ + 1 + 7) / 8 * 8),
       gain_(throughput_sr(spec) / std::pow(spec.camera.ifov_rad(), 2)),
       airy_(airy_constant(spec)),
       faint_w_m2_(faint_w_m2),
       largest_reach_px_(kind.wings != nullptr ? core_px_ : spec.largest_wing_px),
+      wave_m_(middle_wavelength_m(spec)),
       pool_(pool),
+      even_(cascade.lens().even()),
       footprints_(static_cast<std::size_t>((height_px_ + kBandRows - 1) / kBandRows)) {
-  fill_tables(spec, kind);
+  const DefocusRange range = defocus_range(spec, cascade);
+  const double low = measure(range.low_m);
+  const double high = measure(range.high_m);
+  const double step = even_ ? kStepOfSquares : kStep;
+  // Zero is a level: what is in focus is not blended.
+  const int below = static_cast<int>(std::ceil(-low / step));
+  const int above = static_cast<int>(std::ceil(high / step));
+  for (int i = -below; i <= above; ++i) {
+    const double part = i < 0 ? -low * i / below : i > 0 ? high * i / above : 0.0;
+    const double waves = even_ ? std::copysign(std::sqrt(std::abs(part)), part) : part;
+    add_level(cascade, kind, waves * wave_m_);
+  }
+  focus(0.0);
 }
 
-void PointSplat::fill_tables(const OpticsSpec& spec, const Kind& kind) {
+double PointSplat::measure(double defocus_m) const noexcept {
+  const double waves = defocus_m / wave_m_;
+  return even_ ? waves * std::abs(waves) : waves;
+}
+
+void PointSplat::focus(double defocus_m) noexcept {
+  const double place =
+      std::clamp(measure(defocus_m), levels_.front().measure, levels_.back().measure);
+  lower_ = 0;
+  while (lower_ + 2 < levels_.size() && levels_[lower_ + 1].measure <= place) ++lower_;
+  upper_share_ = 0.0;
+  if (levels_.size() > 1)
+    upper_share_ =
+        (place - levels_[lower_].measure) / (levels_[lower_ + 1].measure - levels_[lower_].measure);
+}
+
+void PointSplat::add_level(const OtfCascade& cascade, const Kind& kind, double defocus_m) {
   const int side = 2 * core_px_ + 1;
-  const int places = (core_px_ + 1) * kPhases + 2;
+  const auto focused = cascade.focused(defocus_m);
+  const auto square = [&](double f) { return sinc(f) / sinc(f * kind.mean_over_px); };
+  const auto apart = [&](double fu, double fv) {
+    return kind.wings != nullptr ? kind.wings->otf(std::hypot(fu, fv)) : 0.0;
+  };
+  const PointImageSpec lattice{cascade.cutoff_per_px(), (core_px_ + 1) * kPhases + 1,
+                               1.0 / kPhases};
   const Eigen::MatrixXd image =
-      image_of_a_point(BandOtf(spec.band), spec.camera.pixel_pitch_m, kind, places, 1.0 / kPhases);
-  peak_share_ = image(0, 0);
-  const int shares = kTables * kTables * side * stride_;
-  tables_.resize(static_cast<std::size_t>(shares));
+      cascade.radial()
+          ? even_point_image(lattice,
+                             [&](double fu, double fv) {
+                               const double otf = cascade.at_radial(std::hypot(fu, fv), focused);
+                               return (otf - apart(fu, fv)) * square(fu) * square(fv);
+                             })
+          : point_image(lattice, [&](double fu, double fv) {
+              return (cascade.at(fu, fv, focused) - apart(fu, fv)) * square(fu) * square(fv);
+            });
+  if (defocus_m == 0.0) peak_share_ = image(lattice.half_places, lattice.half_places);
+  Level& level = levels_.emplace_back();
+  level.measure = measure(defocus_m);
+  level.shares.resize(static_cast<std::size_t>(kTables * kTables * side * stride_));
   std::size_t at = 0;
   // Phase 1 + kPhases / 2 is no displacement. A point to the right of a pixel's centre shows to the
   // pixel as a displacement to the left.
   const auto place = [&](int pixel, int phase) {
-    return std::abs((pixel - core_px_) * kPhases - (phase - 1 - kPhases / 2));
+    return lattice.half_places + (pixel - core_px_) * kPhases - (phase - 1 - kPhases / 2);
   };
   for (int phase_v = 0; phase_v < kTables; ++phase_v)
     for (int phase_u = 0; phase_u < kTables; ++phase_u)
       for (int row = 0; row < side; ++row)
         for (int column = 0; column < stride_; ++column, ++at)
-          tables_[at] = column < side
-                            ? static_cast<float>(image(place(row, phase_v), place(column, phase_u)))
+          level.shares[at] =
+              column < side ? static_cast<float>(image(place(row, phase_v), place(column, phase_u)))
                             : 0.0F;
 }
 
-const float* PointSplat::table_row(int phase_v, int phase_u, int row) const noexcept {
+const float* PointSplat::table_row(const Level& level, int phase_v, int phase_u,
+                                   int row) const noexcept {
   const int side = 2 * core_px_ + 1;
-  return tables_.data() +
+  return level.shares.data() +
          static_cast<std::ptrdiff_t>((phase_v * kTables + phase_u) * side + row) * stride_;
 }
 
@@ -193,13 +239,20 @@ void PointSplat::streak(const PointSource& point, double followed_px, const Band
 
 void PointSplat::stamp(const Footprint& print, const Band& band,
                        IrradianceImage& out) const noexcept {
-  add_core(print, band, out);
+  if (upper_share_ < 1.0) add_core(print, levels_[lower_], 1.0 - upper_share_, band, out);
+  if (upper_share_ > 0.0) add_core(print, levels_[lower_ + 1], upper_share_, band, out);
   if (print.reach_px > core_px_) add_wings(print, band, out);
 }
 
-void PointSplat::add_core(const Footprint& print, const Band& band,
-                          IrradianceImage& out) const noexcept {
-  const int reach = std::min(print.reach_px, core_px_);
+void PointSplat::add_core(const Footprint& print, const Level& level, double weight,
+                          const Band& band, IrradianceImage& out) const noexcept {
+  // Where light is followed less far than the table goes, the outermost pixels fade, so that no
+  // centroid jumps as pixels come in and drop out.
+  const bool fades = print.reach_px < core_px_;
+  const int reach = fades ? print.reach_px + 1 : core_px_;
+  const auto share = [&](double away) {
+    return fades ? std::clamp(print.reach_px + 0.5 - std::abs(away), 0.0, 1.0) : 1.0;
+  };
   const int u = static_cast<int>(std::floor(print.u + 0.5));
   const int v = static_cast<int>(std::floor(print.v + 0.5));
   const int left = std::max(u - reach, 0);
@@ -213,19 +266,29 @@ void PointSplat::add_core(const Footprint& print, const Band& band,
   const int phase_v = static_cast<int>(std::floor(place_v)) + kPhases / 2;
   const auto weight_u = cubic(place_u - std::floor(place_u));
   const auto weight_v = cubic(place_v - std::floor(place_v));
-  const auto light = static_cast<float>(print.light);
   for (int row = top; row < bottom; ++row) {
+    const auto light = static_cast<float>(weight * print.light * share(row - print.v));
     float* pixels = out.row(row).data() + left;
     for (int j = 0; j < 4; ++j) {
       const float w = light * weight_v[static_cast<std::size_t>(j)];
       const int first = left - u + core_px_;
-      const float* a = table_row(phase_v + j, phase_u, row - v + core_px_) + first;
-      const float* b = table_row(phase_v + j, phase_u + 1, row - v + core_px_) + first;
-      const float* c = table_row(phase_v + j, phase_u + 2, row - v + core_px_) + first;
-      const float* d = table_row(phase_v + j, phase_u + 3, row - v + core_px_) + first;
-      for (int i = 0; i < right - left; ++i)
-        pixels[i] +=
-            w * (weight_u[0] * a[i] + weight_u[1] * b[i] + weight_u[2] * c[i] + weight_u[3] * d[i]);
+      const float* a = table_row(level, phase_v + j, phase_u, row - v + core_px_) + first;
+      const float* b = table_row(level, phase_v + j, phase_u + 1, row - v + core_px_) + first;
+      const float* c = table_row(level, phase_v + j, phase_u + 2, row - v + core_px_) + first;
+      const float* d = table_row(level, phase_v + j, phase_u + 3, row - v + core_px_) + first;
+      const auto add = [&](int from, int to, float part) {
+        for (int i = from; i < to; ++i)
+          pixels[i] += part * (weight_u[0] * a[i] + weight_u[1] * b[i] + weight_u[2] * c[i] +
+                               weight_u[3] * d[i]);
+      };
+      // Two columns at either end may fade.
+      const int begin = std::clamp(u - reach + 2 - left, 0, right - left);
+      const int end = std::clamp(u + reach - 1 - left, begin, right - left);
+      for (int i = 0; i < begin; ++i)
+        add(i, i + 1, w * static_cast<float>(share(left + i - print.u)));
+      add(begin, end, w);
+      for (int i = end; i < right - left; ++i)
+        add(i, i + 1, w * static_cast<float>(share(left + i - print.u)));
     }
   }
 }
@@ -237,14 +300,14 @@ void PointSplat::add_wings(const Footprint& print, const Band& band,
   const int v = static_cast<int>(std::floor(print.v + 0.5));
   const int reach = print.reach_px;
   const double strength = print.light * airy_;
-  const double furthest = 1.0 * reach * reach;
   const auto add = [&](std::span<float> pixels, int from, int to, double dv) {
     for (int i = std::max(from, 0); i < std::min(to, width_px_); ++i) {
       const double du = i - print.u;
       const double square = du * du + dv * dv;
-      if (square <= furthest)
-        pixels[static_cast<std::size_t>(i)] +=
-            static_cast<float>(strength / (square * std::sqrt(square)));
+      const double away = std::sqrt(square);
+      // The last pixel fades, so that no centroid jumps as pixels come in and drop out.
+      const double share = std::clamp(reach + 0.5 - away, 0.0, 1.0);
+      pixels[static_cast<std::size_t>(i)] += static_cast<float>(share * strength / (square * away));
     }
   };
   for (int row = std::max(v - reach, band.top); row < std::min(v + reach + 1, band.bottom); ++row) {

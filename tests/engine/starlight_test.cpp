@@ -33,7 +33,7 @@ struct Scene {
     star.v_magnitude = v;
     star.colour_b_v = 0.653F;
     catalogue.stars = {star};
-    splat = std::make_unique<PointSplat>(optics, kFaint_w_m2, pool);
+    splat = std::make_unique<PointSplat>(optics, OtfCascade(optics), kFaint_w_m2, pool);
     starlight = std::make_unique<Starlight>(
         StarField(catalogue, optics.camera, StarLight(detector.mean_wavelength_m)), *splat,
         detector);
@@ -41,7 +41,7 @@ struct Scene {
   StarReport add(const Radiance& in = {}) {
     image.resize(kSide_px, kSide_px);
     std::ranges::fill(image.pixels(), 0.0F);
-    return starlight->add(looking_up(), in, 0.0, image);
+    return starlight->add(looking_up(), in, 0.0, 0.0, image);
   }
   [[nodiscard]] double sum() const {
     double total = 0;

@@ -7,6 +7,7 @@
 #include "engine/core/constants.h"
 #include "engine/optics/mtf.h"
 #include "engine/optics/optics_spec.h"
+#include "engine/optics/otf_cascade.h"
 #include "engine/scene/point_source.h"
 
 namespace test_support {
@@ -18,15 +19,15 @@ class ExactSpread {
   /// Images repeat after so many pixels: at half of that a neighbour's wing has 3e-9 of the light.
   static constexpr int kPeriod_px = 512;
 
-  explicit ExactSpread(const engine::OpticsSpec& spec) {
-    const engine::BandOtf lens(spec.band);
-    const double pitch_m = spec.camera.pixel_pitch_m;
-    const int waves = static_cast<int>(lens.cutoff_per_m() * pitch_m * kPeriod_px) + 1;
+  explicit ExactSpread(const engine::OpticsSpec& spec, double defocus_m = 0.0) {
+    const engine::OtfCascade cascade(spec);
+    const auto focused = cascade.focused(defocus_m);
+    const int waves = static_cast<int>(cascade.cutoff_per_px() * kPeriod_px) + 1;
     otf_.resize(waves, waves);
     for (int k = 0; k < waves; ++k)
       for (int j = 0; j < waves; ++j)
-        otf_(k, j) = lens.at(std::hypot(wave(k), wave(j)) / pitch_m) * engine::sinc(wave(k)) *
-                     engine::sinc(wave(j));
+        otf_(k, j) = cascade.at_radial(std::hypot(wave(k), wave(j)), focused) *
+                     engine::sinc(wave(k)) * engine::sinc(wave(j));
   }
 
   /// Shares of a point's light in the pixels from `left`, `top` on; `smear`: as it moves.

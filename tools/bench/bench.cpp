@@ -187,7 +187,7 @@ void bench_star_footprints(benchmark::State& state) {
   const double to_e = scenario.detector.electrons_per_irradiance(scenario.run.exposure);
   const double faint_w_m2 = 0.3 * scenario.detector.noise_e(0.0) / to_e;
   WorkerPool pool(static_cast<int>(state.range(1)));
-  PointSplat splat(scenario.optics, faint_w_m2, pool);
+  PointSplat splat(scenario.optics, OtfCascade(scenario.optics), faint_w_m2, pool);
   std::vector<PointSource> stars(10000);
   Draws draws(1, Stream::kShot, 0, 0);
   for (PointSource& star : stars)

@@ -101,6 +101,17 @@ int run_command(int argc, char** argv) {
       ->check(CLI::Range(16, 1024))
       ->capture_default_str();
 
+  starloop::MtfOptions mtf;
+  CLI::App* mtf_app = app.add_subcommand(
+      "mtf", "Write the terms of the optics' transfer function and their product, and draw them");
+  add_common(*mtf_app, common);
+  mtf_app
+      ->add_option("--time", mtf.time_s,
+                   "shutter opens, seconds after the epoch: range and smear are those of then; "
+                   "default: the pass' closest")
+      ->check(CLI::Range(0.0, 9e9));
+  mtf_app->add_option("--out", mtf.out, "CSV file; the PNG goes beside it")->capture_default_str();
+
   starloop::SoakOptions soak;
   CLI::App* soak_app = app.add_subcommand(
       "soak", "Fly a pass over and over; exit 1 when anything slips, grows or gets lost");
@@ -131,6 +142,7 @@ int run_command(int argc, char** argv) {
   if (run_app->parsed()) return starloop::run_pass(common, run);
   if (soak_app->parsed()) return starloop::soak(common, soak);
   if (replay_app->parsed()) return starloop::replay_log(replay);
+  if (mtf_app->parsed()) return starloop::export_mtf(common, mtf);
   if (links_app->parsed()) return starloop::list_links();
   if (passes_app->parsed()) return starloop::list_passes(common, json);
   return starloop::render_frames(common, render);

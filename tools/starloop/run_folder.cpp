@@ -8,13 +8,10 @@
 #include <memory>
 #include <stdexcept>
 
-#include <spawn.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
 #include "engine/core/constants.h"
 #include "engine/orbit/utc.h"
 #include "tools/starloop/picture.h"
+#include "tools/starloop/plot_script.h"
 
 namespace starloop {
 
@@ -201,30 +198,12 @@ void write_tables(const fs::path& folder, const Scenario& scenario, const RunLog
   }
 }
 
-namespace {
-
-/// A script of tools/plot, by Debian's own python3: the one that has python3-matplotlib.
-bool run_script(const char* name, const fs::path& folder, const std::string& more) {
-  std::string python = "/usr/bin/python3";
-  std::string script = std::string(STARLOOP_SOURCE_DIR) + "/tools/plot/" + name;
-  std::string where = folder.string();
-  std::string other = more;
-  char* arguments[] = {python.data(), script.data(), where.data(),
-                       other.empty() ? nullptr : other.data(), nullptr};
-  pid_t child = 0;
-  if (posix_spawn(&child, python.c_str(), nullptr, nullptr, arguments, environ) != 0) return false;
-  int status = 0;
-  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
-  }
-  return WIFEXITED(status) && WEXITSTATUS(status) == 0;
-}
-
-}  // namespace
-
 bool draw_pictures(const fs::path& folder, const std::string& compare) {
-  return run_script("run_report.py", folder, compare);
+  return run_plot_script("run_report.py", folder.string(), compare);
 }
 
-bool write_page(const fs::path& folder) { return run_script("report_html.py", folder, ""); }
+bool write_page(const fs::path& folder) {
+  return run_plot_script("report_html.py", folder.string());
+}
 
 }  // namespace starloop

@@ -229,6 +229,7 @@ Scenario read_scenario(const ConfigReader& config) {
   s.companions = engine::read_companions(config);
   s.materials = engine::read_materials(config);
   s.optics = engine::read_optics(config.table("optics"), s.scene.camera);
+  s.optics.stars = s.stars.source != engine::StarSpec::Source::kNone;
   s.render = engine::read_render(config.table("render"));
   if (s.render.method_by_need && wants_paths(config.table("render"), s))
     s.render.method = engine::RenderMethod::kPaths;

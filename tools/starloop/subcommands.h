@@ -25,6 +25,13 @@ struct RenderOptions {
 /// a picture of all of them besides.
 int render_frames(const CommonOptions& options, const RenderOptions& render);
 
+struct MtfOptions {
+  double time_s = -1;  ///< shutter opens; below 0: at the chosen pass' closest
+  std::string out = "mtf.csv";
+};
+/// Writes every term of the optics' transfer function and their product, and draws them.
+int export_mtf(const CommonOptions& options, const MtfOptions& mtf);
+
 struct RunOptions {
   bool open_loop = false;
   std::string out = "out";

@@ -131,44 +131,13 @@ TEST(Mtf, IntegralIsTheAreaOfThePupil) {
   }
 }
 
-TEST(BandOtf, IsWithinAThousandthOf41Wavelengths) {
-  for (const double e : {0.0, 0.3}) {
-    BandOtf::Spec spec;
-    spec.obscuration = e;
-    const BandOtf band(spec);
-    for (double per_mm = 0.0; per_mm < 180.0; per_mm += 0.37) {
-      double sum = 0;
-      double weights = 0;
-      for (int i = 0; i <= 40; ++i) {
-        const double weight = i == 0 || i == 40 ? 0.5 : 1.0;
-        const double wavelength_m = 450e-9 + i * 10e-9;
-        sum += weight * diffraction_otf(per_mm * 1e3 * wavelength_m * kFocalRatio, e);
-        weights += weight;
-      }
-      ASSERT_NEAR(band.at(per_mm * 1e3), sum / weights, 1e-3) << e << " " << per_mm;
-    }
-  }
-}
-
-TEST(BandOtf, EndsAtTheShortestWavelengthsCutoff) {
-  const BandOtf band(BandOtf::Spec{});
-  EXPECT_NEAR(band.cutoff_per_m() * 1e-3, 177.8, 0.05);  // 1/(.45 um 12.5)
-  EXPECT_FLOAT_EQ(static_cast<float>(band.at(0.0)), 1.0F);
-  EXPECT_EQ(band.at(band.cutoff_per_m()), 0.0);
-  EXPECT_EQ(band.at(1e9), 0.0);
-  EXPECT_GE(band.at(0.999 * band.cutoff_per_m()), 0.0);
-}
-
-TEST(BandOtf, GivesTheSystemsResponseAtNyquist) {
+TEST(Mtf, OfElevenWavelengthsGivesTheSystemsResponseAtNyquist) {
   // .170 with the pixel's own, three digits, is the mean of 11 wavelengths with both ends counted.
   const double nyquist_per_m = 0.5 / kPitch_m;
   double eleven = 0;
   for (int i = 0; i < 11; ++i)
     eleven += diffraction_otf(nyquist_per_m * (450 + 40 * i) * 1e-9 * kFocalRatio, 0.0) / 11.0;
   EXPECT_NEAR(eleven * box_otf(0.5, 1.0), 0.170, 0.0005);
-  // The ends weigh half of that in the band itself: 1/22 of their difference from the mean.
-  const BandOtf band(BandOtf::Spec{});
-  EXPECT_NEAR(band.at(nyquist_per_m), eleven, 0.002);
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "engine/core/constants.h"
+#include "engine/optics/mtf.h"
 #include "tests/support/scenes.h"
 
 namespace engine {
@@ -125,7 +126,7 @@ class ShareByIntegral {
   std::array<double, 3 * kSteps> otf_{};  // to 1.5 times the cutoff: a square's corner
 };
 
-// Five wavelengths are within 1e-3 of 41 at each frequency (BandOtf), and the pixel passes about
+// Five wavelengths are within 1e-3 of 41 at each frequency (LensOtf), and the pixel passes about
 // one square cycle per pixel: 1e-3 of a point's light. The window's own echo is 2e-8.
 constexpr double kShareTolerance = 1e-3;
 
@@ -216,8 +217,8 @@ TEST(Optics, CentroidFollowsThePointAsSamplingBiasesIt) {
   // x - OTF(1)/pi sin(2 pi x), by Poisson's sum. Wings end unevenly in a window of +-X about a
   // pixel: their profile there, .0815/X^2, twice that with the padding's echoes and a quarter more,
   // times the window, 2 X: .0063 of the phase at 64.
-  const BandOtf band(BandOtf::Spec{});
-  const double otf_at_one = band.at(1.0 / 6.5e-6);
+  const OtfCascade cascade(spec_of());
+  const double otf_at_one = cascade.at_radial(1.0, cascade.focused(0.0));
   for (const double phase : {0.0, 0.1, 0.25, 0.4, 0.5, -0.25}) {
     const Projected out = project(point_at(256.0 + phase, 256.0));
     double sum = 0;
@@ -426,7 +427,7 @@ TEST(Optics, AveragesNoiseOverTheSquaredSpreadOfAPoint) {
 
 TEST(Optics, ObscurationTakesItsAreaFromTheThroughput) {
   OpticsSpec spec = spec_of();
-  spec.band.obscuration = 0.3;
+  spec.lens.obscuration = 0.3;
   WorkerPool pool(1);
   const Optics optics(spec, kFaint_w_m2, pool);
   EXPECT_DOUBLE_EQ(optics.throughput_sr(), kPi / 4.0 * 0.08 * 0.08 * 0.7 * (1.0 - 0.09));
@@ -554,7 +555,7 @@ TEST(ReadOptics, RefusesALensThatThreeCellsCannotCarry) {
         ConfigReader::from_text("[optics]\ntransmission = 0.7\naperture_m = " + aperture, "x.toml");
     return read_optics(config.table("optics"), CameraGeometry{});
   };
-  EXPECT_DOUBLE_EQ(read("0.36").band.aperture_m, 0.36);
+  EXPECT_DOUBLE_EQ(read("0.36").lens.aperture_m, 0.36);
   // Half of 3 cells per 6.5 um is 231 lp/mm; 450 nm reach it at .467 m.
   EXPECT_NO_THROW(read("0.467"));
   EXPECT_THROW(read("0.468"), ConfigError);

@@ -21,8 +21,8 @@ constexpr double kFollowAll_w_m2 = 1e-30;  // of faint light
 OpticsSpec spec_of(double aperture_m = 0.36, double obscuration = 0.0) {
   OpticsSpec spec;
   spec.camera = test_support::small_camera(kSide_px);
-  spec.band.aperture_m = aperture_m;
-  spec.band.obscuration = obscuration;
+  spec.lens.aperture_m = aperture_m;
+  spec.lens.obscuration = obscuration;
   return spec;
 }
 
@@ -44,7 +44,7 @@ struct Picture {
 Picture splat(const std::vector<PointSource>& points, const OpticsSpec& spec = spec_of(),
               int threads = 1, double faint_w_m2 = kFollowAll_w_m2) {
   WorkerPool pool(threads);
-  PointSplat splat(spec, faint_w_m2, pool);
+  PointSplat splat(spec, OtfCascade(spec), faint_w_m2, pool);
   Picture out;
   out.image.resize(spec.camera.width_px, spec.camera.height_px);
   out.report = splat.add(points, out.image);
@@ -98,7 +98,7 @@ TEST(PointSplat, ImageAndCentroidAreThoseOfTheTransformAtEveryPhase) {
       const Picture got = splat({star}, spec);
       const Picture want = exact(star, spec);
       const double error = largest_difference(got, want) / want.highest();
-      EXPECT_LT(error, 1e-3) << spec.band.aperture_m << ", phase " << i;
+      EXPECT_LT(error, 1e-3) << spec.lens.aperture_m << ", phase " << i;
       const int u = static_cast<int>(std::lround(star.place.u));
       const int v = static_cast<int>(std::lround(star.place.v));
       EXPECT_NEAR(centroid(got, u, v, 8).u, centroid(want, u, v, 8).u, 1e-3) << i;
@@ -192,7 +192,7 @@ TEST(PointSplat, SameBitsOnAnyNumberOfThreads) {
 
 TEST(PointSplat, NoPointsChangeNothing) {
   WorkerPool pool(1);
-  PointSplat splat(spec_of(), kFollowAll_w_m2, pool);
+  PointSplat splat(spec_of(), OtfCascade(spec_of()), kFollowAll_w_m2, pool);
   IrradianceImage image(kSide_px, kSide_px);
   std::ranges::fill(image.pixels(), 0.25F);
   EXPECT_EQ(splat.add({}, image).footprints, 0U);

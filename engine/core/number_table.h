@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-namespace hil {
+namespace engine {
 
 /// A small file of numbers: a first line that names the columns ("t_s,x_urad,y_urad"), then rows,
 /// separated by commas; empty lines and those that begin with # do not count.
@@ -15,13 +15,13 @@ struct NumberTable {
   std::string path;
   std::vector<Row> rows;
 
-  /// Throws engine::ConfigError: "path:line: complaint".
+  /// Throws ConfigError: "path:line: complaint".
   [[noreturn]] void fail(int line, const std::string& complaint) const;
 };
 
-/// Throws engine::ConfigError, with path and line, for other columns, a cell that is no finite
+/// Throws ConfigError, with path and line, for other columns, a cell that is no finite
 /// number, or more than `most_rows`.
 [[nodiscard]] NumberTable read_number_table(const std::string& path, const std::string& columns,
                                             std::size_t most_rows);
 
-}  // namespace hil
+}  // namespace engine

@@ -1,4 +1,4 @@
-#include "hil/number_table.h"
+#include "engine/core/number_table.h"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +7,8 @@
 
 namespace {
 
-using hil::NumberTable;
-using hil::read_number_table;
+using engine::NumberTable;
+using engine::read_number_table;
 using test_support::TempFile;
 
 /// What is said about a file that holds `content`, without the file's name; at most three rows.

@@ -1,4 +1,4 @@
-#include "hil/number_table.h"
+#include "engine/core/number_table.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 
 #include "engine/core/contract.h"
 
-namespace hil {
+namespace engine {
 namespace {
 
 constexpr std::size_t kLongestLine = 1000;
@@ -45,7 +45,7 @@ void read_row(const NumberTable& table, const std::string& line, std::size_t col
 }  // namespace
 
 void NumberTable::fail(int line, const std::string& complaint) const {
-  throw engine::ConfigError(path + ":" + std::to_string(line) + ": " + complaint);
+  throw ConfigError(path + ":" + std::to_string(line) + ": " + complaint);
 }
 
 NumberTable read_number_table(const std::string& path, const std::string& columns,
@@ -53,7 +53,7 @@ NumberTable read_number_table(const std::string& path, const std::string& column
   NumberTable table;
   table.path = path;
   std::ifstream file(path, std::ios::binary);
-  if (!file) throw engine::ConfigError(path + ": expected a table, found no file to read");
+  if (!file) throw ConfigError(path + ": expected a table, found no file to read");
   const auto count = static_cast<std::size_t>(std::count(columns.begin(), columns.end(), ',')) + 1;
   bool named = false;
   std::string line;
@@ -76,9 +76,9 @@ NumberTable read_number_table(const std::string& path, const std::string& column
     read_row(table, line, count, row);
     table.rows.push_back(std::move(row));
   }
-  if (file.bad()) throw engine::ConfigError(path + ": expected a table, found one unreadable");
+  if (file.bad()) throw ConfigError(path + ": expected a table, found one unreadable");
   if (!named) table.fail(1, "must name the columns \"" + columns + "\", got nothing");
   return table;
 }
 
-}  // namespace hil
+}  // namespace engine
