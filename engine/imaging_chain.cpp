@@ -96,7 +96,8 @@ FrameReport ImagingChain::expose(const Shot& shot, Budget budget, DnImage& out,
         stars_->add(snapshot, radiance_, radiance_.uniform_w_m2_sr * optics_.throughput_sr(),
                     optics_.star_defocus_m(snapshot.range_m), irradiance_);
   const Duration projected = now();
-  detector_.expose(irradiance_, shot.exposure, snapshot.seed, shot.sequence, electrons_);
+  report.detector =
+      detector_.expose(irradiance_, shot.exposure, snapshot.seed, shot.sequence, electrons_);
   detector_.digitize(electrons_, snapshot.seed, shot.sequence, out);
   report.times = {built - start, rendered - built, projected - rendered, now() - projected};
 
@@ -135,7 +136,7 @@ void ImagingChain::measure_light(const PixelRect& window, Duration exposure, Fra
   mask.clear();
   const double to_e = detector_spec_.electrons_per_irradiance(exposure);
   const double sky = radiance_.uniform_w_m2_sr * optics_.throughput_sr();
-  const double dark_e = detector_spec_.dark_e_s * seconds(exposure);
+  const double dark_e = detector_spec_.dark_mean_e(exposure);
   const bool before_earth = !radiance_.earth.empty();
   double background = sky;
   double noise_e = detector_spec_.noise_e(background * to_e + dark_e);

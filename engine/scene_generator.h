@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "engine/core/image.h"
+#include "engine/detector/detector.h"
 #include "engine/optics/optics.h"
 #include "engine/render/renderer.h"
 #include "engine/scene/snapshot.h"
@@ -105,6 +106,7 @@ struct FrameReport {
   RenderReport render;
   OpticsReport optics;
   StarReport stars;
+  DetectorReport detector;
   StageTimes times;
   int peak_dn = 0;
 };

@@ -35,7 +35,7 @@ Starlight::Starlight(StarField field, PointSplat& splat, const DetectorSpec& det
 StarReport Starlight::add(const Snapshot& snapshot, const Radiance& in, double background_w_m2,
                           double defocus_m, IrradianceImage& out) noexcept {
   const double to_e = detector_.electrons_per_irradiance(snapshot.exposure);
-  const double dark_e = background_w_m2 * to_e + detector_.dark_e_s * seconds(snapshot.exposure);
+  const double dark_e = background_w_m2 * to_e + detector_.dark_mean_e(snapshot.exposure);
   const double e_per_w_m2 = splat_.pixels_per_irradiance() * to_e;
   StarLimits limits;
   limits.faint_w_m2 =

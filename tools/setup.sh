@@ -8,7 +8,7 @@ packages=(
   g++ cmake ninja-build ccache pkg-config git
   # libraries that the program links
   libembree-dev libopencv-dev libeigen3-dev libtomlplusplus-dev libcli11-dev libspdlog-dev
-  liberfa-dev libcfitsio-dev librandom123-dev libtinyobjloader-dev libmeshoptimizer-dev
+  liberfa-dev libcfitsio-dev libhwy-dev librandom123-dev libtinyobjloader-dev libmeshoptimizer-dev
   nlohmann-json3-dev libasio-dev libssl-dev libusb-1.0-0-dev
   # tests, benchmarks, pictures
   libgtest-dev libumockdev-dev umockdev libbenchmark-dev python3 python3-matplotlib python3-numpy

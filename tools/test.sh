@@ -36,7 +36,7 @@ else
   tools/setup.sh
   build asan
   # Statistics of many pictures: minutes under a sanitizer, and the same code as in the others.
-  ctest --preset asan -j "$jobs" -LE 'long|slow' -E '^PathTracerNoise'
+  ctest --preset asan -j "$jobs" -LE 'long|slow' -E '^(PathTracerNoise|NoiseStatistics)'
 fi
 # Without these the checks against a real kernel are skipped, and each says so.
 tools/setup.sh --guest ||

@@ -28,11 +28,17 @@ enum class Stream : std::uint32_t {
 class Draws {
  public:
   Draws(std::uint64_t seed, Stream stream, std::uint64_t frame, std::uint32_t place) noexcept
-      : key_{{static_cast<std::uint32_t>(seed),
-              static_cast<std::uint32_t>(seed >> 32) ^
-                  (static_cast<std::uint32_t>(stream) * 0x9E3779B9u)}},
+      : key_{{key(seed, stream)[0], key(seed, stream)[1]}},
         counter_{{place, static_cast<std::uint32_t>(frame), static_cast<std::uint32_t>(frame >> 32),
                   0}} {}
+
+  /// Philox's key, for those who draw many places at once.
+  [[nodiscard]] static constexpr std::array<std::uint32_t, 2> key(std::uint64_t seed,
+                                                                  Stream stream) noexcept {
+    return {static_cast<std::uint32_t>(seed),
+            static_cast<std::uint32_t>(seed >> 32) ^
+                (static_cast<std::uint32_t>(stream) * 0x9E3779B9u)};
+  }
 
   /// The next four words at once.
   [[nodiscard]] std::array<std::uint32_t, 4> block() noexcept {

@@ -8,6 +8,7 @@
 #include "drivers/pixel_packing.h"
 #include "drivers/usb_packet.h"
 #include "engine/core/random.h"
+#include "engine/detector/noise_lanes.h"
 #include "tools/starloop/scenario.h"
 
 namespace {
@@ -121,6 +122,53 @@ void bench_poisson(benchmark::State& state) {
   for (auto _ : state) benchmark::DoNotOptimize(draws.poisson(mean));
 }
 BENCHMARK(bench_poisson)->ArgName("log10_mean")->DenseRange(-2, 4, 1);
+
+/// The bound that the detector's frames are held against: one normal number a pixel, 1024 x 1024.
+void bench_gaussian_frame(benchmark::State& state) {
+  std::vector<float> numbers(std::size_t{1024} * 1024);
+  std::uint64_t frame = 0;
+  for (auto _ : state) {
+    noise_lanes::normals({1, frame++, 0}, Stream::kRead, numbers);
+    benchmark::ClobberMemory();
+  }
+}
+BENCHMARK(bench_gaussian_frame)->Unit(benchmark::kMillisecond);
+
+/// Electrons to DN on one thread: a frame of so many electrons a pixel; 0: the paper's dark sky
+/// with a disc of 115 px that collects 15 000. 11 bits as in the paper, or 16 with a pedestal.
+void bench_detector_frame(benchmark::State& state) {
+  DetectorSpec spec;
+  spec.bits = static_cast<int>(state.range(1));
+  if (spec.bits == 16) {
+    spec.pedestal_dn = 100;
+    spec.quantiser = Quantiser::kRound;
+  }
+  const Duration exposure = std::chrono::milliseconds(1);
+  const double to_e = spec.electrons_per_irradiance(exposure);
+  const auto level_e = static_cast<double>(state.range(0));
+  IrradianceImage light(1024, 1024);
+  for (int v = 0; v < 1024; ++v)
+    for (int u = 0; u < 1024; ++u) {
+      const double sky_e = level_e > 0.0 ? level_e : 1e-3;
+      const bool lit = level_e == 0.0 && std::hypot(u - 512, v - 512) < 57.5;
+      // The disc is no plane: each of its pixels has a mean of its own.
+      light.at(u, v) = static_cast<float>((lit ? 15000.0 + u + 0.3 * v : sky_e) / to_e);
+    }
+  WorkerPool pool(1);
+  const Detector detector(spec, pool);
+  ElectronImage electrons;
+  DnImage dn;
+  std::uint64_t frame = 0;
+  for (auto _ : state) {
+    detector.expose(light, exposure, 1, frame, electrons);
+    detector.digitize(electrons, 1, frame++, dn);
+    benchmark::ClobberMemory();
+  }
+}
+BENCHMARK(bench_detector_frame)
+    ->ArgNames({"electrons", "bits"})
+    ->ArgsProduct({{0, 1, 8, 15, 30, 100, 15000}, {11, 16}})
+    ->Unit(benchmark::kMillisecond);
 
 /// A frame of the paper's pass, so many seconds after its closest point; stages as counters.
 void expose_flyby(benchmark::State& state, const starloop::Scenario& scenario, double after_s,

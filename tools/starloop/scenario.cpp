@@ -300,7 +300,7 @@ Rig::Rig(const Scenario& scenario, int threads)
     generator_ = std::make_unique<PatternGenerator>(detector.bits);
     return;
   }
-  const double dark_e = detector.dark_e_s * engine::seconds(scenario.run.exposure);
+  const double dark_e = detector.dark_mean_e(scenario.run.exposure);
   const double faint_w_m2 = kUnseenShareOfNoise * detector.noise_e(dark_e) /
                             detector.electrons_per_irradiance(scenario.run.exposure);
   engine::Optics optics(scenario.optics, faint_w_m2, pool_);
