@@ -1,6 +1,10 @@
 #include "engine/core/fits.h"
 
 #include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <limits>
 #include <stdexcept>
 #include <utility>
 
@@ -172,6 +176,63 @@ DnImage read_fits(const std::string& path) {
                 image.pixels().data(), nullptr, &status);
   check(status, path);
   return image;
+}
+
+namespace {
+
+/// cfitsio would unpack a file of its own accord.
+void check_plain(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file) throw std::runtime_error(path + ": cannot be read");
+  std::string start(9, ' ');
+  file.read(start.data(), static_cast<std::streamsize>(start.size()));
+  if (start != "SIMPLE  =") throw std::runtime_error(path + ": expected an uncompressed FITS file");
+}
+
+void check_map(fitsfile* file, const std::string& path, int width, int height) {
+  int status = 0;
+  int bits = 0;
+  int axes = 0;
+  LONGLONG size[2] = {0, 0};
+  fits_get_img_paramll(file, 2, &bits, &axes, size, &status);
+  check(status, path);
+  if (axes != 2)
+    throw std::runtime_error(path + ": expected a primary image of 2 axes, got " +
+                             std::to_string(axes) + " axes");
+  if (size[0] != width || size[1] != height)
+    throw std::runtime_error(path + ": expected " + std::to_string(width) + " x " +
+                             std::to_string(height) + " pixels, got " + std::to_string(size[0]) +
+                             " x " + std::to_string(size[1]));
+  if (bits != SHORT_IMG && bits != LONG_IMG && bits != FLOAT_IMG && bits != DOUBLE_IMG)
+    throw std::runtime_error(path + ": expected BITPIX 16, 32, -32 or -64, got " +
+                             std::to_string(bits));
+  LONGLONG header = 0;
+  LONGLONG data = 0;
+  LONGLONG end = 0;
+  fits_get_hduaddrll(file, &header, &data, &end, &status);
+  check(status, path);
+  const auto wanted = static_cast<std::uintmax_t>(data + size[0] * size[1] * std::abs(bits) / 8);
+  std::error_code unknown;
+  const std::uintmax_t found = std::filesystem::file_size(path, unknown);
+  if (unknown || found < wanted) throw std::runtime_error(path + ": ends before its image does");
+}
+
+}  // namespace
+
+std::vector<double> read_fits_map(const std::string& path, int width, int height) {
+  check_plain(path);
+  int status = 0;
+  FitsFile in;
+  fits_open_diskfile(&in.file, path.c_str(), READONLY, &status);
+  check(status, path);
+  check_map(in.file, path, width, height);
+  std::vector<double> map(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+  double blank = std::numeric_limits<double>::quiet_NaN();
+  int any_blank = 0;  // cfitsio writes to it where there are some
+  fits_read_img(in.file, TDOUBLE, 1, static_cast<LONGLONG>(map.size()), &blank, map.data(),
+                &any_blank, &status);
+  check(status, path);
+  return map;
 }
 
 }  // namespace engine

@@ -53,4 +53,9 @@ class FitsCube {
 /// Throws std::runtime_error.
 [[nodiscard]] DnImage read_fits(const std::string& path);
 
+/// Reads a map of a camera's pixels: an uncompressed primary image of 2 axes, exactly width x
+/// height, BITPIX 16, 32, -32 or -64, times BSCALE plus BZERO; all checked before any pixel is
+/// read. What the file leaves blank is not a number. Throws std::runtime_error.
+[[nodiscard]] std::vector<double> read_fits_map(const std::string& path, int width, int height);
+
 }  // namespace engine

@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <fstream>
 #include <iterator>
 #include <stdexcept>
 
 #include <gtest/gtest.h>
 
+#include "tests/support/fits_bytes.h"
 #include "tests/support/temp_file.h"
 
 namespace engine {
@@ -132,6 +134,63 @@ TEST(Fits, RefusesWhatIsNoImageOfItsKind) {
   bytes.replace(at, 30, "NAXIS1  =           2000000000");
   const TempFile huge("huge.fits", bytes);
   EXPECT_THROW(static_cast<void>(read_fits(huge.path())), std::runtime_error);
+}
+
+using test_support::fits_bytes;
+using test_support::fits_card;
+
+const std::vector<double> kSix{0.0, 1.0, 2.0, 3.0, 4.0, 500.0};
+
+TEST(FitsMap, ReadsEachKindOfNumber) {
+  for (const int bitpix : {16, 32, -32, -64}) {
+    const TempFile file("map.fits", fits_bytes(bitpix, {3, 2}, kSix));
+    EXPECT_EQ(read_fits_map(file.path(), 3, 2), kSix) << bitpix;
+  }
+}
+
+TEST(FitsMap, ScalesAndKnowsWhatIsBlank) {
+  const TempFile file("scaled.fits",
+                      fits_bytes(16, {3, 2}, {0, 1, 2, 3, 4, -99},
+                                 {fits_card("BSCALE", "0.5"), fits_card("BZERO", "10.0"),
+                                  fits_card("BLANK", "-99")}));
+  const std::vector<double> map = read_fits_map(file.path(), 3, 2);
+  for (int i = 0; i < 5; ++i) EXPECT_EQ(map[static_cast<std::size_t>(i)], 10.0 + 0.5 * i);
+  EXPECT_TRUE(std::isnan(map[5]));
+}
+
+/// What is said of a file that is no map of 3 x 2.
+std::string complaint_about(const std::string& bytes) {
+  const TempFile file("bad.fits", bytes);
+  try {
+    read_fits_map(file.path(), 3, 2);
+  } catch (const std::runtime_error& e) {
+    const std::string text = e.what();
+    EXPECT_EQ(text.rfind(file.path() + ": ", 0), 0U) << text;
+    return text.substr(file.path().size() + 2);
+  }
+  return "nothing";
+}
+
+TEST(FitsMap, RefusesWhatIsNoMapBeforeItReadsAPixel) {
+  EXPECT_EQ(complaint_about(""), "expected an uncompressed FITS file");
+  EXPECT_EQ(complaint_about("\x1f\x8b\x08 gzip"), "expected an uncompressed FITS file");
+  EXPECT_EQ(complaint_about(fits_bytes(-32, {2, 3}, kSix)), "expected 3 x 2 pixels, got 2 x 3");
+  EXPECT_EQ(complaint_about(fits_bytes(-32, {3, 2, 1}, kSix)),
+            "expected a primary image of 2 axes, got 3 axes");
+  // A tile-compressed image is a table behind an empty primary image.
+  EXPECT_EQ(complaint_about(fits_bytes(8, {}, {})),
+            "expected a primary image of 2 axes, got 0 axes");
+  EXPECT_EQ(complaint_about(fits_bytes(8, {3, 2}, kSix)),
+            "expected BITPIX 16, 32, -32 or -64, got 8");
+  EXPECT_EQ(complaint_about(fits_bytes(64, {3, 2}, kSix)),
+            "expected BITPIX 16, 32, -32 or -64, got 64");
+  const std::string whole = fits_bytes(-64, {3, 2}, kSix);
+  EXPECT_EQ(complaint_about(whole.substr(0, 2880 + 47)), "ends before its image does");
+  EXPECT_NE(complaint_about(whole.substr(0, 500)), "nothing");
+  // An image of 8 exabytes in a small file.
+  EXPECT_EQ(complaint_about(fits_bytes(-64, {2000000000, 2000000000}, kSix)),
+            "expected 3 x 2 pixels, got 2000000000 x 2000000000");
+  EXPECT_THROW(read_fits_map("/nowhere/map.fits", 3, 2), std::runtime_error);
 }
 
 }  // namespace
