@@ -48,13 +48,13 @@ void tell_companions(const Snapshot& snapshot, const RenderReport& render,
 }  // namespace
 
 ImagingChain::ImagingChain(const SnapshotBuilder& scene, std::unique_ptr<Renderer> renderer,
-                           Optics optics, const Detector& detector,
-                           const DetectorSpec& detector_spec, const CameraGeometry& camera,
-                           Stopwatch stopwatch, std::unique_ptr<Starlight> stars)
+                           Optics optics, Detector detector, const DetectorSpec& detector_spec,
+                           const CameraGeometry& camera, Stopwatch stopwatch,
+                           std::unique_ptr<Starlight> stars)
     : scene_(scene),
       renderer_(std::move(renderer)),
       optics_(std::move(optics)),
-      detector_(detector),
+      detector_(std::move(detector)),
       detector_spec_(detector_spec),
       stopwatch_(stopwatch),
       stars_(std::move(stars)),

@@ -17,9 +17,8 @@ class ImagingChain final : public SceneGenerator {
   using Stopwatch = Duration (*)() noexcept;
 
   ImagingChain(const SnapshotBuilder& scene, std::unique_ptr<Renderer> renderer, Optics optics,
-               const Detector& detector, const DetectorSpec& detector_spec,
-               const CameraGeometry& camera, Stopwatch stopwatch = nullptr,
-               std::unique_ptr<Starlight> stars = nullptr);
+               Detector detector, const DetectorSpec& detector_spec, const CameraGeometry& camera,
+               Stopwatch stopwatch = nullptr, std::unique_ptr<Starlight> stars = nullptr);
 
   FrameReport expose(const Shot& shot, Budget budget, DnImage& out,
                      TruthMask& mask) noexcept override;

@@ -15,6 +15,12 @@ enum class Stream : std::uint32_t {
   kShot = 2,
   kShotDetail = 3,
   kRead = 4,
+  kPrnu = 5,
+  kDsnu = 6,
+  kHotPixels = 7,
+  kDeadPixels = 8,
+  kColumns = 9,
+  kCosmicRays = 10,
   kJitter = 20,
   kAttitude = 21,
   kFaults = 22

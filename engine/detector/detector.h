@@ -1,9 +1,12 @@
 #pragma once
 
+#include <utility>
+
 #include "engine/core/image.h"
 #include "engine/core/time.h"
 #include "engine/core/worker_pool.h"
 #include "engine/detector/detector_spec.h"
+#include "engine/detector/sensor_maps.h"
 
 namespace engine {
 
@@ -11,16 +14,21 @@ namespace engine {
 struct DetectorReport {
   int full_well_px = 0;  ///< that collected more than the full well
   int no_light_px = 0;   ///< whose irradiance was not a number or negative: taken for darkness
+  int cosmic_rays = 0;
+  double bloomed_away_e = 0;  ///< that ran off the frame's edges
 };
 
 /// Irradiance -> electrons -> DN, in the order of section 4 of the model: light and dark electrons
-/// with Poisson noise, full well, read noise, pedestal, gain, quantiser, clamp.
-/// We differ from Li et al. 2023: 2^bits does not fit into that many bits, so DN end at 2^bits - 1.
-/// Leaves out: PRNU, DSNU, defects, blooming, cosmic rays.
-/// Thread: loop. Loop-safe but for the constructor.
+/// of each pixel's own response and dark current with Poisson noise, cosmic rays, blooming, full
+/// well, read noise, pedestal, gain, quantiser, clamp. We differ from Li et al. 2023: 2^bits does
+/// not fit into that many bits, so DN end at 2^bits - 1. Leaves out: non-linearity, charge
+/// transfer, the noise of rows and columns, what a frame leaves in the next. Thread: loop.
+/// Loop-safe but for the constructor.
 class Detector {
  public:
-  Detector(const DetectorSpec& spec, WorkerPool& pool) : spec_(spec), pool_(pool) {}
+  /// Pre: maps, unless they are empty, of the size of the images.
+  Detector(DetectorSpec spec, WorkerPool& pool, SensorMaps maps = {})
+      : spec_(std::move(spec)), maps_(std::move(maps)), pool_(pool) {}
 
   DetectorReport expose(const IrradianceImage& in, Duration exposure, std::uint64_t seed,
                         std::uint64_t frame, ElectronImage& out) const noexcept;
@@ -28,7 +36,12 @@ class Detector {
                 DnImage& out) const noexcept;
 
  private:
+  /// What more than light fills the wells, and what their edge does to it.
+  void fill_wells(Duration exposure, std::uint64_t seed, std::uint64_t frame, ElectronImage& out,
+                  DetectorReport& report) const noexcept;
+
   DetectorSpec spec_;
+  SensorMaps maps_;
   WorkerPool& pool_;
 };
 

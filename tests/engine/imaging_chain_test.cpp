@@ -97,6 +97,7 @@ TEST(ImagingChain, AFrameHasTheSameBitsOnAnyNumberOfThreads) {
   const FrameReport report = one.expose(one.shot(kClosestOfPass3_s), first);
   ASSERT_EQ(first.width(), kSide_px);
   EXPECT_GT(report.peak_dn, 20);
+  EXPECT_EQ(report.detector.no_light_px, 0);
   for (const int threads : {1, 2, 3}) {
     Rig rig(threads);
     DnImage again;

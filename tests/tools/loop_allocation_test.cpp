@@ -20,11 +20,13 @@ namespace {
 using engine::Duration;
 
 /// The paper's pass through a camera of 128 x 128 coarse pixels, the whole telescope in view.
-/// "far": a wide field, in which it is five pixels across and drawn from its light as a whole.
+/// "sensor": with all that a detector can have. "far": a wide field, in which it is five pixels
+/// across and drawn from its light as a whole.
 starloop::Scenario small_scenario(const std::string& what) {
   const bool companions = what == "companions";
   const bool far = what == "far";
-  const std::string method = companions || far ? "paths" : what;
+  const bool sensor = what == "sensor";
+  const std::string method = companions || far || sensor ? "paths" : what;
   starloop::CommonOptions options;
   options.file = STARLOOP_SOURCE_DIR "/config/flyby.toml";
   options.overrides = {"camera.width_px=128",
@@ -49,6 +51,13 @@ starloop::Scenario small_scenario(const std::string& what) {
   if (companions) {
     options.overrides.insert(options.overrides.end(),
                              {"companions.a.along_m=12", "companions.b.cross_m=-15"});
+  }
+  if (sensor) {
+    options.overrides.insert(
+        options.overrides.end(),
+        {"detector.prnu_rms=0.01", "detector.dsnu_rms=0.3", "detector.hot_pixels=0.001",
+         "detector.dead_columns=1", "detector.hot_columns=1", "detector.blooming=column",
+         "detector.full_well_e=500", "detector.cosmic_rays_cm2_s=1e5"});
   }
   return starloop::load_scenario(options);
 }
@@ -197,7 +206,7 @@ TEST_P(LoopAllocation, FiveHundredFramesTakeNoMoreFromTheHeapThanTen) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Methods, LoopAllocation,
-                         testing::Values("paths", "paths_deadline", "lattice", "companions",
-                                         "far"));
+                         testing::Values("paths", "paths_deadline", "lattice", "companions", "far",
+                                         "sensor"));
 
 }  // namespace

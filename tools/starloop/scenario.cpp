@@ -329,8 +329,11 @@ Rig::Rig(const Scenario& scenario, int threads)
   generator_ = std::make_unique<engine::ImagingChain>(
       engine::SnapshotBuilder(scene, camera_, target_, move_companions(scenario)),
       engine::make_renderer(render, bodies.front(), pool_, {bodies.begin() + 1, bodies.end()}),
-      std::move(optics), engine::Detector(detector, pool_), detector, scenario.scene.camera,
-      &hil::SteadyClock::stopwatch, std::move(stars));
+      std::move(optics),
+      engine::Detector(detector, pool_,
+                       engine::SensorMaps(detector, scenario.scene.camera.width_px,
+                                          scenario.scene.camera.height_px)),
+      detector, scenario.scene.camera, &hil::SteadyClock::stopwatch, std::move(stars));
 }
 
 std::vector<engine::Companion> Rig::move_companions(const Scenario& scenario) {

@@ -4,17 +4,14 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "engine/core/constants.h"
 #include "engine/core/random.h"
 #include "engine/detector/noise_lanes.h"
-#include "engine/optics/optics.h"
-#include "engine/orbit/sun.h"
 #include "tests/support/csv.h"
-#include "tests/support/scenes.h"
 #include "tests/support/statistics.h"
 
 namespace engine {
@@ -55,38 +52,6 @@ DnImage digitized(const DetectorSpec& spec, const ElectronImage& electrons, std:
   DnImage out;
   Detector(spec, pool).digitize(electrons, seed, frame, out);
   return out;
-}
-
-TEST(DetectorSpec, TurnsALambertPlateIntoTheModelsElectrons) {
-  const Csv reference("electrons_lambert30.csv");
-  WorkerPool pool(1);
-  OpticsSpec optics_spec;
-  optics_spec.camera = test_support::small_camera(32);
-  const Optics optics(optics_spec, 1.0, pool);
-  int golden = 0;
-  for (const Csv::Row& row : reference.rows()) {
-    DetectorSpec spec;
-    const bool mono = row.text("photon_energy_model") == "650nm";
-    spec.mean_wavelength_m = mono ? 650e-9 : black_body_sun(kAstronomicalUnit_m).mean_wavelength_m;
-    const Duration exposure = from_seconds(1e-3 * row.number("exposure_ms"));
-    const double electrons =
-        row.number("L_W_m2_sr") * optics.throughput_sr() * spec.electrons_per_irradiance(exposure);
-    // Ten digits are printed; the constants of nature are exact.
-    EXPECT_NEAR(electrons / row.number("electrons"), 1.0, 1e-8);
-    golden += std::abs(electrons - 16214.10) < 0.01 ? 1 : 0;
-    golden += std::abs(electrons - 15708.00) < 0.01 ? 1 : 0;
-    const double dn = std::floor(std::min(electrons, spec.full_well_e) / spec.gain_e_dn());
-    EXPECT_EQ(std::min(dn, static_cast<double>(spec.largest_dn())), row.number("DN_floor"));
-  }
-  EXPECT_GE(golden, 2);
-}
-
-TEST(DetectorSpec, NoiseIsTheModelsSigma) {
-  const DetectorSpec spec;
-  EXPECT_NEAR(spec.noise_e(0.35), 4.72, 0.005);
-  EXPECT_NEAR(spec.noise_e(1000.0), 32.0, 0.5);
-  EXPECT_NEAR(spec.noise_e(10000.0), 100.0, 0.5);
-  EXPECT_NEAR(spec.noise_e(30000.0), 173.0, 0.5);
 }
 
 TEST(Detector, HasTheReferencesMeanAndVariance) {
@@ -367,21 +332,159 @@ TEST(Detector, APixelsNoiseDoesNotDependOnItsNeighboursLight) {
   }
 }
 
-TEST(ReadDetector, RefusesWhatIsNoDetector) {
-  const auto read = [](const std::string& changed) {
-    ConfigReader config = ConfigReader::from_text(
-        "[detector]\nquantum_efficiency = 0.55\nfull_well_e = 30000.0\nread_noise_e = 2.0\n"
-        "dark_e_s = 35.0\nbits = 11\n",
-        "x.toml");
-    if (!changed.empty()) config.set(changed);
-    return read_detector(config.table("detector"), 6.5e-6, 650e-9);
+/// Everything that a sensor can have.
+DetectorSpec spoiled() {
+  DetectorSpec spec;
+  spec.prnu_rms = 0.02;
+  spec.dsnu_rms = 0.3;
+  spec.hot_pixels = 0.01;
+  spec.dead_pixels = 0.01;
+  spec.hot_columns = 1;
+  spec.dead_columns = 1;
+  spec.blooming = Blooming::kColumn;
+  spec.cosmic_rays_cm2_s = 1e6;
+  return spec;
+}
+
+TEST(Detector, APlainSpecHasTheBitsOfADetectorWithoutMaps) {
+  const DetectorSpec spec;
+  WorkerPool pool(1);
+  const IrradianceImage light = even_light(spec, 5.0, 64);
+  ElectronImage out;
+  Detector(spec, pool, SensorMaps(spec, 64, 64)).expose(light, kMillisecond, 1, 0, out);
+  EXPECT_TRUE(std::ranges::equal(out.pixels(), exposed(spec, light).pixels()));
+}
+
+TEST(Detector, FixedPatternStaysWhereFramesAverageOut) {
+  DetectorSpec spec;
+  spec.prnu_rms = 0.02;
+  spec.dsnu_rms = 0.5;
+  spec.dark_e_s = 1e6;  // 1000 e- in 1 ms
+  constexpr int kSide = 128;
+  constexpr int kFrames = 50;
+  const SensorMaps maps(spec, kSide, kSide);
+  WorkerPool pool(1);
+  const Detector detector(spec, pool, maps);
+  const IrradianceImage light = even_light(spec, 5000.0, kSide);
+  std::vector<double> sum(kSide * kSide, 0.0);
+  ElectronImage out;
+  for (std::uint64_t frame = 0; frame < kFrames; ++frame) {
+    detector.expose(light, kMillisecond, 1, frame, out);
+    for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += static_cast<double>(out.pixels()[i]);
+  }
+  // Each pixel's own mean, in sigmas of its own shot noise: a variance of one.
+  double chi2 = 0;
+  for (std::size_t i = 0; i < sum.size(); ++i) {
+    const double mean = 5000.0 * static_cast<double>(maps.response()[i]) +
+                        1e-3 * static_cast<double>(maps.dark_e_s()[i]);
+    chi2 += std::pow(sum[i] - kFrames * mean, 2) / (kFrames * mean);
+  }
+  const auto n = static_cast<double>(sum.size());
+  EXPECT_NEAR(chi2 / n, 1.0, 4.5 * std::sqrt(2.0 / n));
+}
+
+TEST(Detector, DeadPixelsStayEmptyWhateverFallsOnThem) {
+  DetectorSpec spec = spoiled();
+  const SensorMaps maps(spec, 64, 64);
+  WorkerPool pool(2);
+  IrradianceImage light(64, 64);
+  std::fill(light.pixels().begin(), light.pixels().end(), std::numeric_limits<float>::infinity());
+  ElectronImage out;
+  const DetectorReport report =
+      Detector(spec, pool, maps).expose(light, std::chrono::seconds(1), 1, 0, out);
+  EXPECT_GT(report.cosmic_rays, 100);
+  int dead = 0;
+  for (std::size_t i = 0; i < out.pixels().size(); ++i) {
+    const bool collects = maps.response()[i] > 0.0F;
+    dead += collects ? 0 : 1;
+    ASSERT_EQ(out.pixels()[i], collects ? 30000.0F : 0.0F) << i;
+  }
+  EXPECT_GE(dead, 64);
+  EXPECT_EQ(report.full_well_px, 64 * 64 - dead);
+}
+
+TEST(Detector, BackgroundAddsToTheDarkCurrent) {
+  DetectorSpec spec;
+  spec.dark_e_s = 1000.0;
+  spec.background_e_s = 2000.0;
+  for (const double prnu : {0.0, 1e-9}) {  // without a map, and with one
+    spec.prnu_rms = prnu;
+    WorkerPool pool(1);
+    ElectronImage out;
+    Detector(spec, pool, SensorMaps(spec, kSide_px, kSide_px))
+        .expose(even_light(spec, 2.0), kMillisecond, 1, 0, out);
+    Moments moments;
+    for (const float e : out.pixels()) moments.add(static_cast<double>(e));
+    EXPECT_NEAR(moments.mean(), 5.0, 5.0 * std::sqrt(5.0) / kSide_px);
+  }
+}
+
+TEST(Detector, CosmicRaysAreClippedAtTheFullWell) {
+  DetectorSpec spec = dark_free();
+  spec.cosmic_rays_cm2_s = 1e5;
+  spec.full_well_e = 500;
+  WorkerPool pool(1);
+  ElectronImage out;
+  const IrradianceImage dark(256, 256);
+  const DetectorReport report =
+      Detector(spec, pool).expose(dark, std::chrono::milliseconds(10), 1, 0, out);
+  int full = 0;
+  for (const float e : out.pixels()) {
+    ASSERT_LE(e, 500.0F);
+    full += e == 500.0F ? 1 : 0;
+  }
+  EXPECT_GT(report.cosmic_rays, 10);
+  EXPECT_GT(report.full_well_px, 5);
+  EXPECT_GE(full, report.full_well_px);
+}
+
+TEST(Detector, BloomedChargeIsInTheFrameOrInTheReport) {
+  DetectorSpec spec = dark_free();
+  IrradianceImage light = even_light(spec, 20000.0, 128);
+  for (int v = 50; v < 55; ++v)
+    for (int u = 40; u < 50; ++u) light.at(u, v) *= 4.0F;
+  for (int v = 0; v < 128; ++v) light.at(90, v) *= 2.0F;
+  const auto sum = [](const ElectronImage& image) {
+    double all = 0;
+    for (const float e : image.pixels()) all += static_cast<double>(e);
+    return all;
   };
-  EXPECT_EQ(read("").largest_dn(), 2047);
-  EXPECT_EQ(read("detector.quantiser=round").quantiser, Quantiser::kRound);
-  for (const char* wrong : {"detector.full_well_e=-30000", "detector.bits=17", "detector.bits=10.5",
-                            "detector.quantum_efficiency=1.1", "detector.read_noise_e=-1",
-                            "detector.quantiser=ceil", "detector.dark_e_s=nan"})
-    EXPECT_THROW(read(wrong), ConfigError) << wrong;
+  DetectorSpec deep = spec;
+  deep.full_well_e = 1e7;
+  const double collected = sum(exposed(deep, light));
+  spec.blooming = Blooming::kColumn;
+  WorkerPool pool(2);
+  ElectronImage out;
+  const DetectorReport report = Detector(spec, pool).expose(light, kMillisecond, 1, 0, out);
+  EXPECT_EQ(report.full_well_px, 50 + 128);
+  EXPECT_GT(report.bloomed_away_e, 1e5);
+  EXPECT_EQ(sum(out) + report.bloomed_away_e, collected);
+  for (const float e : out.pixels()) ASSERT_LE(e, 30000.0F);
+}
+
+TEST(Detector, ASpoiledSensorGivesTheSameBitsOnAnyNumberOfThreads) {
+  const DetectorSpec spec = spoiled();
+  IrradianceImage light(333, 77);
+  const double to_e = spec.electrons_per_irradiance(kMillisecond);
+  for (std::size_t i = 0; i < light.pixels().size(); ++i)
+    light.pixels()[i] = static_cast<float>(static_cast<double>(i % 400) * 100.0 / to_e);
+  const SensorMaps maps(spec, 333, 77);
+  ElectronImage want;
+  DetectorReport first;
+  for (const int threads : {1, 2, 3}) {
+    WorkerPool pool(threads);
+    ElectronImage out;
+    const DetectorReport report = Detector(spec, pool, maps).expose(light, kMillisecond, 1, 0, out);
+    if (threads == 1) {
+      want = out;
+      first = report;
+      continue;
+    }
+    EXPECT_TRUE(std::ranges::equal(out.pixels(), want.pixels())) << threads;
+    EXPECT_EQ(report.full_well_px, first.full_well_px);
+    EXPECT_EQ(report.cosmic_rays, first.cosmic_rays);
+    EXPECT_EQ(report.bloomed_away_e, first.bloomed_away_e);
+  }
 }
 
 }  // namespace
