@@ -97,7 +97,8 @@ TEST(SensorMaps, HotPixelsAreTheirShareAndExponential) {
   spec.dark_doubling_c = 10;
   spec.temperature_c = 10;  // twice as hot
   Moments hot;
-  for (const float x : maps_of(spec).dark_e_s())
+  const SensorMaps maps = maps_of(spec);
+  for (const float x : maps.dark_e_s())
     if (x > 0.0F) hot.add(static_cast<double>(x));
   const auto count = static_cast<double>(hot.count());
   EXPECT_NEAR(count, 0.01 * kPixels, 4.5 * std::sqrt(0.01 * kPixels));
