@@ -11,6 +11,9 @@ namespace {
 
 constexpr int kCell = FarWings::kCell_px;
 constexpr int kTableSteps = 1024;
+// Cycles per pixel.
+constexpr double kFadesFrom = 0.12;
+constexpr double kFadesTo = 0.24;
 // Cells beside the outermost pixel that its interpolation looks at.
 constexpr int kBeside = 2;
 // Along a side, than pixels would have it: halves of cells at either end, and what the transform's
@@ -57,7 +60,9 @@ double FarWings::otf(double per_px) const noexcept {
   double sum = 0;
   for (std::size_t i = 0; i < strength_.size(); ++i)
     sum += strength_[i] * std::exp(-2.0 * kPi * softness_px_[i] * per_px);
-  return sum;
+  // The cells end at a quarter of a cycle; what is left there would ring along the axes.
+  const double end = std::clamp((per_px - kFadesFrom) / (kFadesTo - kFadesFrom), 0.0, 1.0);
+  return sum * 0.5 * (1.0 + std::cos(kPi * end));
 }
 
 void FarWings::gather(const RadianceImage& picture, const PixelRect& region,

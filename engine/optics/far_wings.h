@@ -22,8 +22,8 @@ struct WingLaw {
 ///
 /// Two softened laws c / (r^2 + s^2)^(3/2) that together follow the law from s on; each has the
 /// transform 2 pi c / s exp(-2 pi s f), which the fine grid's OTF is then free of, exactly: what is
-/// left of a point's image there ends within three s but for its rings. At the cells' own limit the
-/// wings' OTF is down to 3e-4. Thread: loop. Loop-safe but for the constructor.
+/// left of a point's image there ends within three s but for its rings. The wings' OTF fades out
+/// below the cells' own limit. Thread: loop. Loop-safe but for the constructor.
 class FarWings {
  public:
   static constexpr int kCell_px = 2;

@@ -15,6 +15,8 @@ namespace {
 constexpr double kUnseenShare = 2e-3;
 // A star's defocus beside a target in focus; beyond this its peak is a tenth.
 constexpr double kLargestOfStars_waves = 0.75;
+// Where the lens in focus passes less, what defocus makes of that is not told.
+constexpr double kLeastLens = 1e-3;
 constexpr int kVibrationSteps = 8192;  // 1e-5 off for ten pixels of amplitude
 
 double largest_defocus_m(const OpticsSpec& spec) noexcept {
@@ -79,7 +81,7 @@ std::array<OtfCascade::Term, OtfCascade::kTerms> OtfCascade::terms(
   const std::complex<double> sharp = in_focus_.at(fu / pitch_m_, fv / pitch_m_);
   const std::complex<double> now = lens.at(fu / pitch_m_, fv / pitch_m_);
   return {Term{"lens", sharp},
-          {"defocus", std::abs(sharp) > 0.0 ? now / sharp : 0.0},
+          {"defocus", std::abs(sharp) > kLeastLens ? now / sharp : 0.0},
           {"jitter", jitter_otf(f, jitter_px_)},
           {"vibration", vibration(fu, fv)},
           {"table", mtf_.at(f / pitch_m_)},

@@ -7,7 +7,7 @@
 namespace engine {
 namespace {
 
-constexpr int kPeriod_px = 256;
+constexpr int kPeriod_px = 128;
 
 int waves_of(const PointImageSpec& spec) noexcept {
   return static_cast<int>(spec.cutoff_per_px * kPeriod_px) + 1;

@@ -15,7 +15,7 @@ struct PointImageSpec {
 };
 
 /// Shares of a point's light by displacement: [v][u], the middle at no displacement. The sum over
-/// all waves of a period of 256 px: half of that away from a neighbour 3e-8 of the light is left.
+/// all waves of a period of 128 px: 80 px from a neighbour 8e-8 of its light is left.
 /// Slow: for tables at set-up.
 /// Of an OTF that is real and the same for either sign of either frequency:
 [[nodiscard]] Eigen::MatrixXd even_point_image(const PointImageSpec& spec,

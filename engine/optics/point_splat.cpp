@@ -23,8 +23,8 @@ double airy_constant(const OpticsSpec& spec) {
 }
 
 // Between levels, in waves: of W20^2 where its sign does not matter.
-constexpr double kStepOfSquares = 0.045;
-constexpr double kStep = 1.0 / 24.0;
+constexpr double kStepOfSquares = 0.04;
+constexpr double kStep = 1.0 / 12.0;
 // Nobody sees stars beside what is nearer than this.
 constexpr double kNearest_m = 1e3;
 

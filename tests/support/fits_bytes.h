@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <cstdio>
 #include <cstring>
 #include <string>
 #include <vector>
@@ -10,8 +9,12 @@ namespace test_support {
 
 /// One line of a FITS header.
 [[nodiscard]] inline std::string fits_card(const std::string& keyword, const std::string& value) {
-  char card[81];
-  std::snprintf(card, sizeof card, "%-8s= %20s%50s", keyword.c_str(), value.c_str(), "");
+  std::string card = keyword;
+  card.resize(8, ' ');
+  card += "= ";
+  card.append(value.size() < 20 ? 20 - value.size() : 0, ' ');
+  card += value;
+  card.resize(80, ' ');
   return card;
 }
 

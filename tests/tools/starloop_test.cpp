@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <fstream>
 #include <map>
 #include <sstream>
 #include <string>
@@ -295,6 +296,38 @@ TEST(StarloopPasses, PrintsSixteenObjectsWithTheDocumentedKeys) {
     EXPECT_LT(p.at("min_range_km").get<double>(), 300.0);
     last_end_s = p.at("end_s").get<double>();
   }
+}
+
+TEST(StarloopMtf, WritesEveryTermAndTheirProduct) {
+  const TemporaryFolder folder;
+  const std::string csv = (folder.path() / "mtf.csv").string();
+  const Outcome run = starloop({"mtf", kFlyby, "--out", csv, "--set", "optics.focus=infinity",
+                                "--set", "optics.jitter_urad=0.5"});
+  ASSERT_EQ(run.exit_code, kGood) << run.err;
+  // At the closest, 68.966 km: D^2/8 of 1/Z.
+  EXPECT_NE(run.out.find("defocus 234.9 nm"), std::string::npos) << run.out;
+  std::ifstream file(csv);
+  std::string line;
+  ASSERT_TRUE(std::getline(file, line));
+  EXPECT_EQ(line,
+            "direction_deg,frequency_lp_mm,cycles_per_px,lens,defocus,jitter,vibration,table,"
+            "pixel,smear,product_re,product_im");
+  int rows = 0;
+  while (std::getline(file, line)) {
+    ++rows;
+    std::vector<double> v;
+    std::stringstream cells(line);
+    for (std::string cell; std::getline(cells, cell, ',');) v.push_back(std::stod(cell));
+    ASSERT_EQ(v.size(), 12U);
+    // Nine digits are printed; the tables of the lens are of single precision.
+    if (std::abs(v[3]) > 1e-2) {
+      EXPECT_NEAR(v[3] * v[4] * v[5] * v[6] * v[7] * v[8] * v[9], v[10], 1e-6) << line;
+    }
+  }
+  EXPECT_EQ(rows, 4 * 401);
+  const Outcome bad = starloop({"mtf", kFlyby, "--out", "/nonexistent/mtf.csv"});
+  EXPECT_EQ(bad.exit_code, kDeviceFault);
+  EXPECT_NE(bad.err.find("/nonexistent/mtf.csv: cannot be written"), std::string::npos) << bad.err;
 }
 
 TEST(StarloopPasses, PrintsALineForEach) {

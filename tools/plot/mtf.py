@@ -31,8 +31,10 @@ def main():
     frequency = table["frequency_lp_mm"][along_u]
     for name, colour in zip(names, COLOURS):
         value = table[name][along_u]
+        if name == "defocus":  # not told where the lens passes next to nothing
+            value = np.where(np.abs(table["lens"][along_u]) > 1e-3, value, np.nan)
         # What does nothing is not drawn.
-        if np.ptp(value) > 1e-6:
+        if np.nanmax(value) - np.nanmin(value) > 1e-6:
             left.plot(frequency, value, color=colour, label=name)
     product = table["product_re"][along_u]
     left.plot(frequency, product, color="#222222", linewidth=2, label="all together")

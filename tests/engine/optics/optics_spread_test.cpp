@@ -1,0 +1,242 @@
+// How Optics spreads light: where the fine grid ends and the far wings begin, long smears, glints,
+// and what is out of focus. Throughput, places and laws of the small: optics_test.cpp.
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "engine/core/constants.h"
+#include "engine/optics/optics.h"
+#include "tests/support/exact_spread.h"
+#include "tests/support/scenes.h"
+
+namespace engine {
+namespace {
+
+using test_support::ExactSpread;
+using test_support::small_camera;
+
+constexpr int kSide_px = 512;
+
+OpticsSpec spec_of(int side_px = kSide_px) {
+  OpticsSpec spec;
+  spec.camera = small_camera(side_px);
+  return spec;
+}
+
+struct Projected {
+  IrradianceImage image;
+  OpticsReport report;
+  [[nodiscard]] double at(int u, int v) const { return static_cast<double>(image.at(u, v)); }
+  [[nodiscard]] double sum() const {
+    double total = 0;
+    for (const float x : image.pixels()) total += static_cast<double>(x);
+    return total;
+  }
+};
+
+Projected project(const Radiance& in, const OpticsSpec& spec, double faint_w_m2, int threads = 1) {
+  WorkerPool pool(threads);
+  Optics optics(spec, faint_w_m2, pool);
+  Projected out;
+  out.report = optics.project(in, out.image);
+  return out;
+}
+
+Radiance dark_over(PixelRect region) {
+  Radiance in;
+  in.region = region;
+  in.grid.resize(3 * region.width(), 3 * region.height());
+  std::ranges::fill(in.grid.pixels(), 0.0F);
+  return in;
+}
+
+/// A disc with dark patches: edges everywhere.
+Radiance patched_disc(int across_px, int middle_px) {
+  const int corner = middle_px - across_px / 2;
+  Radiance in = dark_over({corner, corner, corner + across_px, corner + across_px});
+  const double half = 1.5 * across_px;
+  for (int y = 0; y < in.grid.height(); ++y)
+    for (int x = 0; x < in.grid.width(); ++x)
+      if (std::hypot(x - half, y - half) < half && (x / 40 + y / 33) % 3 != 0)
+        in.grid.at(x, y) = 1.0F;
+  return in;
+}
+
+TEST(OpticsSpread, WingsOnTheirOwnGridAreThoseOfTheFineOne) {
+  // The paper's camera and sensor: radiance 1 is 15 000 e-, faint is three tenths of 4.7 e-.
+  const double e = throughput_sr(spec_of()) / 15000.0;
+  const Radiance in = patched_disc(40, 256);
+  OpticsSpec spec = spec_of();
+  spec.largest_wing_px = 64;
+  const Projected fine = project(in, spec, 1e-6 * e);
+  const Projected split = project(in, spec, 0.3 * 4.7 * e);
+  EXPECT_EQ(fine.report.core_px, 64);
+  EXPECT_EQ(split.report.core_px, 16);
+  // As far as 32 px from it: further out the fine grid's own copies, 168 px apart, show.
+  double sigmas = 0;
+  for (int v = 256 - 52; v < 256 + 52; ++v)
+    for (int u = 256 - 52; u < 256 + 52; ++u)
+      sigmas = std::max(sigmas, std::abs(fine.at(u, v) - split.at(u, v)) / e /
+                                    std::sqrt(std::max(fine.at(u, v) / e, 0.0) + 22.0));
+  // Convolution's share of what the default profile loses in noise, sqrt(.2 x .1) sigma.
+  EXPECT_LT(sigmas, 0.14);
+}
+
+TEST(OpticsSpread, ALongSmearIsTheMeanOfStillImages) {
+  const OpticsSpec spec = spec_of();
+  const double e = throughput_sr(spec) / 15000.0;
+  const Projected still = project(patched_disc(40, 200), spec, 0.01 * e);
+  for (const int length_px : {50, 200}) {
+    Radiance in = patched_disc(40, 200 + length_px / 2);
+    in.motion_px = {1.0 * length_px, 0.0};
+    const Projected out = project(in, spec, 0.01 * e);
+    EXPECT_GT(out.report.segments, 1);
+    double worst = 0;
+    for (int u = 30; u < 480; ++u) {
+      double mean = 0;  // trapezium: whole pixels, the ends half
+      for (int k = 0; k <= length_px; ++k) {
+        const int from = u - k;
+        if (from >= 0)
+          mean += still.at(from, 200 + length_px / 2 - length_px / 2) *
+                  (k == 0 || k == length_px ? 0.5 : 1.0) / length_px;
+      }
+      worst = std::max(worst, std::abs(out.at(u, 200 + length_px / 2) - mean));
+    }
+    // Waves of one cycle per pixel and more, which whole pixels do not see, are 1e-4 of an edge.
+    EXPECT_LT(worst, 2e-3 * throughput_sr(spec) * 40.0 / length_px) << length_px;
+    EXPECT_NEAR(out.sum() / still.sum(), 1.0, 2e-3) << length_px;
+  }
+}
+
+TEST(OpticsSpread, AStreakLongerThanTheFrameLeavesItsShareInIt) {
+  const OpticsSpec spec = spec_of();
+  const double e = throughput_sr(spec) / 15000.0;
+  const Projected still = project(patched_disc(20, 256), spec, 1e-3 * e);
+  Radiance in = patched_disc(20, 256);
+  in.motion_px = {5.0 * kSide_px, 0.0};
+  EXPECT_NEAR(project(in, spec, 1e-3 * e).sum() / still.sum(), 0.2, 1e-3);
+  // Along a diagonal, and so far that next to nothing is left.
+  in.motion_px = {3e5, -3e5};
+  EXPECT_NEAR(project(in, spec, 1e-3 * e).sum() / still.sum(), 512.0 / 3e5, 1e-4);
+  in.motion_px = {1e300, 0.0};
+  EXPECT_EQ(project(in, spec, 1e-3 * e).sum(), 0.0);
+}
+
+TEST(OpticsSpread, AGlintsRoundingIsNotSeenInTheDark) {
+  // A12.6: 1e9 e- in one cell of a region that reaches 500 px further.
+  OpticsSpec spec = spec_of(640);
+  spec.largest_wing_px = 512;
+  const double e = throughput_sr(spec) / 15000.0;  // the irradiance of one electron
+  Radiance in = dark_over({40, 300, 600, 330});
+  in.grid.at(3 * 20 + 1, 3 * 15 + 1) = static_cast<float>(9.0 * 1e9 / 15000.0);
+  const Projected out = project(in, spec, 0.1 * e);
+  EXPECT_EQ(out.report.points, 1);
+  // The mean of the wing, and its copies 1600 px to the side and 1080 px above and below: beyond
+  // the circle of that area 2 pi .0403 / (741 px 1.73e6 px^2) of the light, .2 e-. A transform of
+  // it all would leave 100 e- of rounding.
+  const auto wing_e = [](double r) { return 0.0403 * 1e9 / std::pow(r, 3); };
+  EXPECT_NEAR(out.at(60 + 500, 315) / e, wing_e(500.0) + 0.2, 0.1);
+  EXPECT_NEAR(out.at(60 + 300, 315) / e, wing_e(300.0) + 0.2, 0.1);
+}
+
+TEST(OpticsSpread, ABrightCellIsSpreadAsADimOneIs) {
+  // Just under and over the limit, at all places of a cell in its pixel.
+  const OpticsSpec spec = spec_of(256);
+  const double e = throughput_sr(spec) / 15000.0;
+  for (const int cell : {0, 1, 2}) {
+    Radiance in = dark_over({120, 120, 136, 136});
+    float& bright = in.grid.at(24 + cell, 24 - cell);
+    const double limit = 1e6 * 0.3 * 4.7 * 9.0 / 15000.0;
+    bright = static_cast<float>(0.999 * limit);
+    const Projected dim = project(in, spec, 0.3 * 4.7 * e);
+    bright = static_cast<float>(1.001 * limit);
+    const Projected glint = project(in, spec, 0.3 * 4.7 * e);
+    EXPECT_EQ(dim.report.points, 0);
+    EXPECT_EQ(glint.report.points, 1);
+    double worst = 0;
+    double peak = 0;
+    for (int v = 90; v < 166; ++v) {
+      for (int u = 90; u < 166; ++u) {
+        peak = std::max(peak, dim.at(u, v));
+        worst = std::max(worst, std::abs(glint.at(u, v) / 1.002 - dim.at(u, v)));
+      }
+    }
+    EXPECT_LT(worst, 1e-3 * peak) << cell;
+  }
+}
+
+TEST(OpticsSpread, OutOfFocusIsTheExactImageOfItsRange) {
+  OpticsSpec spec = spec_of(256);
+  spec.focus = Focus::kInfinity;
+  const double light = throughput_sr(spec) / std::pow(spec.camera.ifov_rad(), 2);
+  for (const double range_m : {69e3, 100e3, 200e3}) {
+    Radiance in = dark_over({128, 128, 129, 129});
+    in.range_m = range_m;
+    in.points.push_back({{128.3, 127.8}, 1.0, {}});
+    const Projected out = project(in, spec, 1e-7 * light);
+    const double defocus_m = spec.defocus_m(range_m, range_m);
+    EXPECT_DOUBLE_EQ(out.report.defocus_m, defocus_m);
+    const Eigen::MatrixXd want =
+        ExactSpread(spec, defocus_m).image({128.3, 127.8}, 108, 108, 41, 41);
+    double worst = 0;
+    for (int y = 0; y < 41; ++y)
+      for (int x = 0; x < 41; ++x)
+        worst = std::max(worst, std::abs(out.at(108 + x, 108 + y) / light - want(y, x)));
+    EXPECT_LT(worst, 3e-3 * want.maxCoeff()) << range_m;
+  }
+}
+
+TEST(OpticsSpread, AnExtendedTargetIsAsFarOutOfFocusAsAPoint) {
+  // A pixel of even light on the fine grid against the same as points on the splat's tables.
+  OpticsSpec spec = spec_of(256);
+  spec.focus = Focus::kInfinity;
+  spec.lens.zernike_m[7] = 50e-9;  // coma: not radial, not even
+  const double cell_sr = std::pow(spec.camera.ifov_rad() / 3.0, 2);
+  Radiance grid = dark_over({120, 120, 136, 136});
+  Radiance points = dark_over({120, 120, 136, 136});
+  grid.range_m = points.range_m = 120e3;
+  for (int y = 20; y < 29; ++y) {
+    for (int x = 20; x < 29; ++x) {
+      grid.grid.at(x, y) = 1.0F;
+      if (points.points.size() < Radiance::kMostPoints && x < 28 && y < 28)
+        points.points.push_back({{120.0 + (x - 1) / 3.0, 120.0 + (y - 1) / 3.0}, cell_sr, {}});
+    }
+  }
+  for (int i = 20; i < 29; ++i) grid.grid.at(28, i) = grid.grid.at(i, 28) = 0.0F;
+  const double faint = 1e-5 * throughput_sr(spec);
+  const Projected a = project(grid, spec, faint);
+  const Projected b = project(points, spec, faint);
+  double peak = 0;
+  double worst = 0;
+  double shift = 0;
+  for (int v = 100; v < 156; ++v) {
+    for (int u = 100; u < 156; ++u) {
+      peak = std::max(peak, a.at(u, v));
+      worst = std::max(worst, std::abs(a.at(u, v) - b.at(u, v)));
+      shift += (a.at(u, v) - b.at(u, v)) * (u - 128);
+    }
+  }
+  // The grid takes a cell's own square back out, points have none: (1/3)^2/24 of the second
+  // derivative, a hundredth at an edge this sharp.
+  EXPECT_LT(worst, 0.02 * peak);
+  EXPECT_NEAR(shift / a.sum(), 0.0, 0.01);
+}
+
+TEST(OpticsSpread, SpiderAndErrorsMakeNoNegativeLight) {
+  OpticsSpec spec = spec_of(256);
+  spec.lens.obscuration = 0.3;
+  spec.lens.spider_vanes = 4;
+  spec.lens.spider_width_m = 8e-3;
+  spec.lens.zernike_m[5] = 60e-9;
+  spec.jitter_rad = 0.4e-6;
+  spec.vibration = {1.5e-6, 0.7};
+  const double e = throughput_sr(spec) / 15000.0;
+  const Projected out = project(patched_disc(40, 128), spec, 1e-2 * e);
+  for (const float x : out.image.pixels()) ASSERT_GE(static_cast<double>(x) / e, -0.2);
+  EXPECT_GT(out.sum(), 0.0);
+}
+
+}  // namespace
+}  // namespace engine
