@@ -146,7 +146,6 @@ void Optics::focus(double defocus_m) noexcept {
   defocus_m_ = seen_m;
   cascade_.focus(seen_m, focused_);
   tabulate();
-  cell_splat_.focus(seen_m);
 }
 
 OpticsReport Optics::project(const Radiance& in, IrradianceImage& out) noexcept {
@@ -240,7 +239,7 @@ const RadianceImage& Optics::net_light(const Radiance& in) noexcept {
 }
 
 /// Makes points of cells so bright that the rounding of their transform would be seen; of too many
-/// none, for then what they light up is as bright.
+/// none, for then what they light up is as bright; nor out of focus, where their light is thin.
 const RadianceImage& Optics::take_bright_cells(const Radiance& in,
                                                const RadianceImage& light) noexcept {
   const auto limit =
@@ -248,7 +247,7 @@ const RadianceImage& Optics::take_bright_cells(const Radiance& in,
   bright_.clear();
   const auto is_bright = [limit](float cell) { return cell > limit; };
   const auto count = static_cast<std::size_t>(std::ranges::count_if(light.pixels(), is_bright));
-  if (count == 0 || count > kMostBright) return light;
+  if (count == 0 || count > kMostBright || defocus_m_ != 0.0) return light;
   if (&light != &net_) {
     net_.resize(light.width(), light.height());
     std::ranges::copy(light.pixels(), net_.pixels().begin());

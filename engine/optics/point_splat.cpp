@@ -88,7 +88,7 @@ PointSplat::PointSplat(const OpticsSpec& spec, const OtfCascade& cascade, double
       pool_(pool),
       even_(cascade.lens().even()),
       footprints_(static_cast<std::size_t>((height_px_ + kBandRows - 1) / kBandRows)) {
-  const DefocusRange range = defocus_range(spec, cascade);
+  const DefocusRange range = kind.wings == nullptr ? defocus_range(spec, cascade) : DefocusRange{};
   const double low = measure(range.low_m);
   const double high = measure(range.high_m);
   const double step = even_ ? kStepOfSquares : kStep;

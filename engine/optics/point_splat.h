@@ -35,7 +35,7 @@ class PointSplat {
   /// What a point stands for.
   struct Kind {
     double mean_over_px;    ///< the side of a square that it is the mean of; 0: a point
-    const FarWings* wings;  ///< that are spread by others; none: its own
+    const FarWings* wings;  ///< that are spread by others, and always in focus; none: its own
   };
   /// `faint_w_m2`: irradiance on the detector under which light need not be followed.
   PointSplat(const OpticsSpec& spec, const OtfCascade& cascade, double faint_w_m2, WorkerPool& pool,

@@ -171,11 +171,14 @@ TEST(OpticsSpread, OutOfFocusIsTheExactImageOfItsRange) {
   OpticsSpec spec = spec_of(256);
   spec.focus = Focus::kInfinity;
   const double light = throughput_sr(spec) / std::pow(spec.camera.ifov_rad(), 2);
+  WorkerPool pool(1);
+  Optics optics(spec, 1e-7 * light, pool);
   for (const double range_m : {69e3, 100e3, 200e3}) {
     Radiance in = dark_over({128, 128, 129, 129});
     in.range_m = range_m;
     in.points.push_back({{128.3, 127.8}, 1.0, {}});
-    const Projected out = project(in, spec, 1e-7 * light);
+    Projected out;
+    out.report = optics.project(in, out.image);
     const double defocus_m = spec.defocus_m(range_m, range_m);
     EXPECT_DOUBLE_EQ(out.report.defocus_m, defocus_m);
     const Eigen::MatrixXd want =
@@ -205,9 +208,12 @@ TEST(OpticsSpread, AnExtendedTargetIsAsFarOutOfFocusAsAPoint) {
     }
   }
   for (int i = 20; i < 29; ++i) grid.grid.at(28, i) = grid.grid.at(i, 28) = 0.0F;
-  const double faint = 1e-5 * throughput_sr(spec);
-  const Projected a = project(grid, spec, faint);
-  const Projected b = project(points, spec, faint);
+  WorkerPool pool(1);
+  Optics optics(spec, 1e-5 * throughput_sr(spec), pool);
+  Projected a;
+  Projected b;
+  optics.project(grid, a.image);
+  optics.project(points, b.image);
   double peak = 0;
   double worst = 0;
   double shift = 0;
