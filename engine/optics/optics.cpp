@@ -188,6 +188,8 @@ OpticsReport Optics::project(const Radiance& in, IrradianceImage& out) noexcept 
   report.window = PixelRect{r.left - margin(in.motion_px.u), r.top - margin(in.motion_px.v),
                             r.right + margin(in.motion_px.u), r.bottom + margin(in.motion_px.v)}
                       .clipped_to(spec_.camera.frame());
+  // Of a target beside the frame that has no columns, or no rows.
+  if (report.window.empty()) report.window = PixelRect{};
   return report;
 }
 

@@ -155,6 +155,17 @@ TEST(ImagingChain, WithoutATargetThereIsSkyAndNoPhotocentre) {
   }
 }
 
+TEST(ImagingChain, ATargetBesideTheFrameIsNoTarget) {
+  // As far out as light is followed, and further.
+  Rig rig(1);
+  for (const double off_px : {-900.0, -500.0, -400.0, -250.0, 250.0, 400.0, 500.0, 900.0}) {
+    DnImage image;
+    const FrameReport report = rig.expose(rig.shot(kClosestOfPass3_s, off_px), image);
+    EXPECT_EQ(image.width(), kSide_px);
+    EXPECT_EQ(report.truth.visible_fraction, 0.0) << off_px;
+  }
+}
+
 TEST(ImagingChain, PhotocentreOfABallUnderTheSunFollowsItsPlace) {
   // A ball's light lies off its centre towards the Sun, the same for each place in the frame.
   const Mesh ball = test_support::sphere(1.0F, 24, 48, "white");
