@@ -12,7 +12,7 @@ constexpr int kShortest = 16;
 
 std::size_t at(int i) noexcept { return static_cast<std::size_t>(i); }
 
-/// Lengths with small factors only, and multiples of eight.
+/// Small factors only: a short transform.
 bool is_fast(int n) noexcept {
   for (const int factor : {2, 3, 5})
     while (n % factor == 0) n /= factor;
@@ -26,8 +26,8 @@ std::complex<float> phase_of(double turns) noexcept {
 }  // namespace
 
 int Blur::fast_length(int at_least) noexcept {
-  int n = (std::max(at_least, kShortest) + 7) / 8 * 8;
-  while (!is_fast(n)) n += 8;
+  int n = (std::max(at_least, kShortest) + 3) / 4 * 4;
+  while (!is_fast(n)) n += 4;
   return n;
 }
 
@@ -120,7 +120,8 @@ void Blur::multiply_columns(int filled_from, int filled_to, const GridOtf& otf) 
 }
 
 void Blur::sample(double move_x, double move_y) noexcept {
-  for (int k = 0; k < grid_.height; ++k) {
+  const bool moves = move_x != 0.0 || move_y != 0.0;
+  for (int k = 0; moves && k < grid_.height; ++k) {
     const int wave = k <= grid_.height / 2 ? k : k - grid_.height;
     turned_[at(k)] = phase_of(static_cast<double>(wave) / grid_.height * move_y);
   }

@@ -2,15 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
 #include "engine/core/constants.h"
+#include "engine/core/contract.h"
+#include "engine/optics/lagrange.h"
 
 namespace engine {
 namespace {
 
 constexpr int kCell = FarWings::kCell_px;
 constexpr int kTableSteps = 1024;
+constexpr int kMostFine = 16;
 // Cycles per pixel.
 constexpr double kFadesFrom = 0.12;
 constexpr double kFadesTo = 0.24;
@@ -27,9 +29,9 @@ int cell_of(int pixel) noexcept {
   return pixel >= 0 ? pixel / kCell : -((-pixel + kCell - 1) / kCell);
 }
 
-/// Lagrange's cubic for the pixel in the left or the upper half of a cell, a quarter of a cell from
-/// its middle: weights of the cells from two before to one after. The other half is its mirror.
-constexpr std::array<float, 4> kCubic{-0.0390625F, 0.2734375F, 0.8203125F, -0.0546875F};
+/// For a pixel, a quarter of a cell from the middle of its own: weights of the cell on the other
+/// side, its own, the next one where it lies, and that beyond.
+constexpr std::array<float, 4> kCubic = lagrange_cubic(0.25);
 
 }  // namespace
 
@@ -39,7 +41,6 @@ FarWings::FarWings(const WingLaw& law, double width, int longest_px, WorkerPool&
       blur_(longest_px / kCell + kMoreCells, 1, pool),
       softness_px_{5.0 * width, 7.0 * width},
       table_(kTableSteps + 2, 0.0F),
-      line_(at(longest_px / kCell + kMoreCells)),
       wide_(at(Blur::fast_length(longest_px / kCell + kMoreCells)) * at(longest_px)) {
   // The two together have the law's share, and its next term: that of c / (r^2 + s^2)^(3/2) is
   // - 3/2 c s^2 / r^5.
@@ -51,7 +52,10 @@ FarWings::FarWings(const WingLaw& law, double width, int longest_px, WorkerPool&
                2.0 * kPi * (law.share_px - first) / softness_px_[1]};
   for (int i = 0; i <= kTableSteps; ++i)
     table_[at(i)] = static_cast<float>(otf(static_cast<double>(i) / kTableSteps / kCell));
-  cells_.reserve(longest_px / kCell + kMoreCells, longest_px / kCell + kMoreCells);
+  const int longest = longest_px / kCell + kMoreCells;
+  cells_.reserve(longest, longest);
+  // Of a picture of three cells to a pixel; the system hands out real memory for what is used.
+  lines_.reserve(at(3 * longest_px) * at(longest));
 }
 
 RadialOtf FarWings::table() const noexcept { return {table_, 1.0 * kTableSteps * kCell}; }
@@ -71,36 +75,47 @@ void FarWings::gather(const RadianceImage& picture, const PixelRect& region,
   covered_ = {cell_of(region.left) - 1, cell_of(region.top) - 1, cell_of(region.right - 1) + 2,
               cell_of(region.bottom - 1) + 2};
   cells_.resize(covered_.width(), covered_.height());
-  std::ranges::fill(cells_.pixels(), 0.0F);
   const int fine = oversampling * kCell;  // cells of the picture to one of ours
+  ENSURE(fine <= kMostFine);
+  // Of the cell before, of its own and of the next one, by place within a cell.
+  std::array<std::array<float, 3>, kMostFine> shares{};
+  for (int k = 0; k < fine; ++k) {
+    const float off = (static_cast<float>(k) + 0.5F) / static_cast<float>(fine) - 0.5F;
+    shares[at(k)] = {std::max(-off, 0.0F), 1.0F - std::abs(off), std::max(off, 0.0F)};
+  }
   const int first_x = (region.left - covered_.left * kCell) * oversampling;
   const int first_y = (region.top - covered_.top * kCell) * oversampling;
-  // Of the radiance the mean over a cell: what a transform of cells is to be given.
-  const auto share = static_cast<float>(1.0 / (fine * fine));
-  const auto split = [fine](int place) {
-    const int twice = 2 * place + 1 - fine;  // half cells of the picture from the first middle
-    const int low = twice >= 0 ? twice / (2 * fine) : -1;
-    const float part =
-        static_cast<float>(twice - 2 * fine * low) / (2.0F * static_cast<float>(fine));
-    return std::pair(low, part);
-  };
-  const auto line = std::span(line_).first(at(cells_.width()));
-  for (int y = 0; y < picture.height(); ++y) {
-    std::ranges::fill(line, 0.0F);
+  const std::size_t width = at(cells_.width());
+  if (lines_.size() < at(picture.height()) * width) lines_.resize(at(picture.height()) * width);
+  pool_.rows(0, picture.height(), [&](int y) {
     const auto from = picture.row(y);
-    for (int x = 0; x < picture.width(); ++x) {
-      const auto [low, part] = split(first_x + x);
-      line[at(low)] += (1.0F - part) * from[at(x)];
-      line[at(low + 1)] += part * from[at(x)];
+    const auto line = std::span(lines_).subspan(at(y) * width, width);
+    std::ranges::fill(line, 0.0F);
+    for (int x = 0; x < picture.width();) {
+      const int cell = (first_x + x) / fine;
+      const int end = std::min(picture.width(), (cell + 1) * fine - first_x);
+      std::array<float, 3> sum{};
+      for (; x < end; ++x)
+        for (std::size_t i = 0; i < 3; ++i)
+          sum[i] += shares[at(first_x + x - cell * fine)][i] * from[at(x)];
+      for (std::size_t i = 0; i < 3; ++i) line[at(cell) + i - 1] += sum[i];
     }
-    const auto [low, part] = split(first_y + y);
-    const auto upper = cells_.row(low);
-    const auto lower = cells_.row(low + 1);
-    for (std::size_t i = 0; i < line.size(); ++i) {
-      upper[i] += share * (1.0F - part) * line[i];
-      lower[i] += share * part * line[i];
+  });
+  // Of the radiance the mean over a cell: what a transform of cells is to be given.
+  const auto mean = static_cast<float>(1.0 / (fine * fine));
+  pool_.rows(0, cells_.height(), [&](int row) {
+    const auto to = cells_.row(row);
+    std::ranges::fill(to, 0.0F);
+    const int begin = std::max((row - 1) * fine - first_y, 0);
+    const int end = std::min((row + 2) * fine - first_y, picture.height());
+    for (int y = begin; y < end; ++y) {
+      const int cell = (first_y + y) / fine;
+      const float share = mean * shares[at(first_y + y - cell * fine)][at(row - cell + 1)];
+      if (share == 0.0F) continue;
+      const float* line = &lines_[at(y) * width];
+      for (std::size_t i = 0; i < width; ++i) to[i] += share * line[i];
     }
-  }
+  });
 }
 
 void FarWings::transform(int reach_px, PixelPoint smear_px) noexcept {
@@ -141,7 +156,7 @@ void FarWings::add(PixelPoint move_px, double scale, IrradianceImage& out) noexc
       const float* c = &cells[at(cell_of(u) - left)];
       const int d = u % kCell == 0 ? -1 : 1;  // towards which neighbour it lies
       wide[u - window.left] =
-          share * (kCubic[0] * c[2 * d] + kCubic[1] * c[d] + kCubic[2] * c[0] + kCubic[3] * c[-d]);
+          share * (kCubic[0] * c[-d] + kCubic[1] * c[0] + kCubic[2] * c[d] + kCubic[3] * c[2 * d]);
     }
   });
   pool_.rows(window.top, window.bottom, [&](int v) {
@@ -149,10 +164,10 @@ void FarWings::add(PixelPoint move_px, double scale, IrradianceImage& out) noexc
     const auto wide = [&](int beside) {
       return &wide_[at(cell_of(v) + beside * d - first_row) * at(window.width())];
     };
-    const float* a = wide(2);
-    const float* b = wide(1);
-    const float* c = wide(0);
-    const float* e = wide(-1);
+    const float* a = wide(-1);
+    const float* b = wide(0);
+    const float* c = wide(1);
+    const float* e = wide(2);
     float* to = &out.row(v)[at(window.left)];
     for (int i = 0; i < window.width(); ++i)
       to[i] += kCubic[0] * a[i] + kCubic[1] * b[i] + kCubic[2] * c[i] + kCubic[3] * e[i];

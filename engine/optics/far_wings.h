@@ -21,9 +21,12 @@ struct WingLaw {
 /// The far wings of the spread of light, on cells of two pixels: what is smooth needs no fine grid.
 ///
 /// Two softened laws c / (r^2 + s^2)^(3/2) that together follow the law from s on; each has the
-/// transform 2 pi c / s exp(-2 pi s f), which the fine grid's OTF is then free of, exactly: what is
+/// transform 2 pi c / s exp(-2 pi s f) (Bracewell 2000, The Fourier Transform and Its Applications,
+/// table of Hankel transforms), which the fine grid's OTF is then free of, exactly: what is
 /// left of a point's image there ends within three s but for its rings. The wings' OTF fades out
-/// below the cells' own limit. Thread: loop. Loop-safe but for the constructor.
+/// below the cells' own limit. Leaves out: rings, a spider's spikes, and copies of the wings beyond
+/// where they are followed, together no more than what is faint. Thread: loop. Loop-safe but for
+/// the constructor.
 class FarWings {
  public:
   static constexpr int kCell_px = 2;
@@ -53,8 +56,8 @@ class FarWings {
   std::array<double, 2> strength_;  ///< of each law: 2 pi c / s
   std::vector<float> table_;
   RadianceImage cells_;
-  std::vector<float> line_;  ///< a row of them
-  PixelRect covered_;        ///< in cells from the detector's corner
+  std::vector<float> lines_;  ///< [row of the picture][cell]
+  PixelRect covered_;         ///< in cells from the detector's corner
   int margin_x_ = 0;
   int margin_y_ = 0;
   std::vector<float> wide_;  ///< [cell row][pixel]

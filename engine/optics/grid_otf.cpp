@@ -86,7 +86,14 @@ void GridOtf::fill_column(const Lanes& fx, std::span<Complex> out) const noexcep
     sine.v[c] = static_cast<float>(std::sin(kPi * t));
     cosine.v[c] = static_cast<float>(std::cos(kPi * t));
   }
-  for (std::size_t k = 0; k < out.size(); ++k) {
+  const std::size_t height = out.size();
+  for (std::size_t k = 0; k < height; ++k) {
+    const Row& row = rows_[k];
+    // A radial OTF is the same above and below.
+    const std::size_t mirrored = height - k;
+    out[k] = directed_ || mirrored >= k ? unmoved(per_px, row.per_px) : out[mirrored];
+  }
+  for (std::size_t k = 0; k < height; ++k) {
     const Row& row = rows_[k];
     Lanes factor = pixel * Lanes(row.pixel);
     if (smears_) {
@@ -97,7 +104,7 @@ void GridOtf::fill_column(const Lanes& fx, std::span<Complex> out) const noexcep
       for (int c = 0; c < kLanes; ++c)
         factor.v[c] *= std::abs(x.v[c]) < kFewTurns ? series.v[c] : wave.v[c] / p.v[c];
     }
-    out[k] = unmoved(per_px, row.per_px) * factor;
+    out[k] *= factor;
   }
 }
 

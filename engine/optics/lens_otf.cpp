@@ -5,6 +5,7 @@
 
 #include "engine/core/constants.h"
 #include "engine/core/contract.h"
+#include "engine/optics/lagrange.h"
 #include "engine/optics/mtf.h"
 #include "engine/optics/pupil_grid.h"
 
@@ -36,15 +37,6 @@ constexpr std::size_t kPlaneCells =
 
 std::size_t plane_cell(int x, int y) noexcept {
   return index(y + 2) * index(kPlaneWidth) + index(x + kPlaneSide);
-}
-
-/// Lagrange's cubic through four places -1, 0, 1, 2 at t in [0, 1).
-std::array<float, 4> cubic(double t) noexcept {
-  const double a = t + 1.0;
-  const double b = t - 1.0;
-  const double c = t - 2.0;
-  return {static_cast<float>(-t * b * c / 6.0), static_cast<float>(a * b * c / 2.0),
-          static_cast<float>(-a * t * c / 2.0), static_cast<float>(a * t * b / 6.0)};
 }
 
 /// Of a table of the half plane fy >= 0 without a margin; places in steps.
@@ -343,7 +335,7 @@ double LensOtf::bent(const float* line, double f_per_m) const noexcept {
   const double place = f_per_m / reach_per_m_ * kLineSteps;
   if (!(place < kLineSteps)) return 0.0;
   const int low = static_cast<int>(place);
-  const auto w = cubic(place - low);
+  const auto w = lagrange_cubic(place - low);
   const float* p = line + low;
   return static_cast<double>(w[0] * p[0] + w[1] * p[1] + w[2] * p[2] + w[3] * p[3]);
 }

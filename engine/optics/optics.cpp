@@ -23,17 +23,10 @@ constexpr double kLongestPiece_px = 32.0;
 constexpr double kLongestSmear_px = 1e6;
 // A cell of so much more light than is seen: a transform's rounding, 2^-24 of it, shows.
 constexpr double kBright = 1e6;
-constexpr std::size_t kMostBright = 256;
+constexpr int kMostBright = 256;
 constexpr int kTableSteps = 4096;
 // Of a defocus: a change that keeps the tables, a thousandth of what it does to the OTF.
 constexpr double kSameFocus = 5e-4;
-
-/// The largest, whatever its sign.
-double most_of(std::span<const float> light) noexcept {
-  float most = 0;
-  for (const float x : light) most = std::max(most, std::abs(x));
-  return static_cast<double>(most);
-}
 
 std::size_t at(int i) noexcept { return static_cast<std::size_t>(i); }
 
@@ -97,7 +90,8 @@ Optics::Optics(const OpticsSpec& spec, double faint_w_m2, WorkerPool& pool)
   net_.reserve(most.width() * kOversampling, most.height() * kOversampling);
   behind_.resize(at(most.width()) * at(most.height()));
   points_.reserve(Radiance::kMostPoints);
-  bright_.reserve(kMostBright);
+  bright_.reserve(at(kMostBright));
+  rows_.reserve(at(most.height() * kOversampling));
 }
 
 /// Of a picture's side: light from beyond the frame, too, and a piece of smear.
@@ -157,28 +151,32 @@ OpticsReport Optics::project(const Radiance& in, IrradianceImage& out) noexcept 
   focus(spec_.defocus_m(in.range_m, in.range_m));
   splat_->focus(defocus_m_);
   report.defocus_m = defocus_m_;
-  const double flux = flux_of(in);
+  const RadianceImage& net = net_light(in);
+  const Survey found = survey(net);
+  double flux = found.sum * throughput_sr_ / (kOversampling * kOversampling);
+  for (const PointSource& p : in.points)
+    flux += p.irradiance_w_m2 * splat_->pixels_per_irradiance();
   const int blur_px =
       static_cast<int>(std::ceil(still_blur_px_ + defocus_blur_px(spec_, defocus_m_)));
   const double least_px = kSmallestCore_px + blur_px;
+  const int largest_px =
+      wings_apart() ? spec_.largest_wing_px : std::min(spec_.largest_wing_px, kLargestCore_px);
   const double wing_px = std::ceil(std::cbrt(wing_law_.share_px * flux / faint_w_m2_));
-  report.wing_px = static_cast<int>(
-      std::clamp(wing_px, least_px, std::max(1.0 * spec_.largest_wing_px, least_px)));
+  report.wing_px =
+      static_cast<int>(std::clamp(wing_px, least_px, std::max(1.0 * largest_px, least_px)));
   report.lost_flux_share = 2.0 * kPi * wing_law_.share_px / report.wing_px;
 
-  const double length_px = std::max(std::abs(in.motion_px.u), std::abs(in.motion_px.v));
+  const double length_px = std::hypot(in.motion_px.u, in.motion_px.v);
   if (!(length_px < kLongestSmear_px)) return report;  // too thin for any detector
   const Smear smear{in.motion_px,
                     static_cast<int>(std::max(std::ceil(length_px / kLongestPiece_px), 1.0))};
-  const RadianceImage& net = net_light(in);
-  wings_.gather(net, in.region, kOversampling);
-  const RadianceImage& light = take_bright_cells(in, net);
+  const RadianceImage& whole = without_broken(net, found);
+  if (wings_apart()) wings_.gather(whole, in.region, kOversampling);
+  const RadianceImage& light = take_bright_cells(in, whole, found);
   points_.assign(in.points.begin(), in.points.end());
   for (PointSource& p : points_) p.motion_px = in.motion_px;
   report.points = static_cast<int>(points_.size() + bright_.size());
-  const double brightest = most_of(light.pixels());
-  if (brightest > 0.0 || !bright_.empty())
-    spread_grid(light, in.region, brightest, blur_px, smear, report, out);
+  if (found.sum > 0.0) spread_grid(light, in.region, found, blur_px, smear, report, out);
   splat_->add(points_, out, report.wing_px);
   cell_splat_.add(bright_, out);
   const auto margin = [&](double motion) {
@@ -202,21 +200,40 @@ void Optics::fill_background(const Radiance& in, IrradianceImage& out) noexcept 
   });
 }
 
-/// The target's light, in irradiance summed over pixels; what it hides spreads as what it sends
-/// does: the two together bound their difference.
-double Optics::flux_of(const Radiance& in) const noexcept {
-  double flux = 0;
-  for (const float cell : in.grid.pixels()) flux += static_cast<double>(cell);
-  if (!in.earth.empty()) {
-    double hidden = 0;
-    for (const float cell : in.cover.pixels()) hidden += static_cast<double>(cell);
-    flux += hidden * std::abs(in.earth.at({0.5 * (in.region.left + in.region.right),
-                                           0.5 * (in.region.top + in.region.bottom)}));
-  }
-  flux *= throughput_sr_ / (kOversampling * kOversampling);
-  for (const PointSource& p : in.points)
-    flux += p.irradiance_w_m2 * splat_->pixels_per_irradiance();
-  return flux;
+/// What of the light there is, whatever its sign; what is no number is none.
+Optics::Survey Optics::survey(const RadianceImage& light) noexcept {
+  const auto limit =
+      static_cast<float>(kBright * faint_w_m2_ * kOversampling * kOversampling / throughput_sr_);
+  rows_.resize(at(light.height()));
+  pool_.rows(0, light.height(), [&](int y) {
+    constexpr std::size_t kSums = 8;  // side by side, for the processor has room for them
+    std::array<float, kSums> most{};
+    std::array<float, kSums> most_dim{};
+    std::array<double, kSums> sum{};
+    std::array<int, kSums> bright{};
+    std::array<int, kSums> broken{};
+    const auto cells = light.row(y);
+    for (std::size_t first = 0; first < cells.size(); first += kSums) {
+      const std::size_t count = std::min(kSums, cells.size() - first);
+      for (std::size_t k = 0; k < count; ++k) {
+        const float here = std::abs(cells[first + k]);
+        const bool finite = here <= std::numeric_limits<float>::max();
+        const float counts = finite ? here : 0.0F;
+        sum[k] += static_cast<double>(counts);
+        broken[k] += finite ? 0 : 1;
+        bright[k] += counts > limit ? 1 : 0;
+        most[k] = std::max(most[k], counts);
+        most_dim[k] = std::max(most_dim[k], counts > limit ? 0.0F : counts);
+      }
+    }
+    Survey& row = rows_[at(y)] = {};
+    for (std::size_t k = 0; k < kSums; ++k)
+      row.add({sum[k], most[k], most_dim[k], bright[k], broken[k]});
+  });
+  Survey all;
+  for (const Survey& row : rows_) all.add(row);
+  all.bright_limit = limit;
+  return all;
 }
 
 /// The grid less what it hides of the Earth.
@@ -240,26 +257,38 @@ const RadianceImage& Optics::net_light(const Radiance& in) noexcept {
   return net_;
 }
 
-/// Makes points of cells so bright that the rounding of their transform would be seen; of too many
-/// none, for then what they light up is as bright; nor out of focus, where their light is thin.
-const RadianceImage& Optics::take_bright_cells(const Radiance& in,
-                                               const RadianceImage& light) noexcept {
-  const auto limit =
-      static_cast<float>(kBright * faint_w_m2_ * kOversampling * kOversampling / throughput_sr_);
-  bright_.clear();
-  const auto is_bright = [limit](float cell) { return cell > limit; };
-  const auto count = static_cast<std::size_t>(std::ranges::count_if(light.pixels(), is_bright));
-  if (count == 0 || count > kMostBright || defocus_m_ != 0.0) return light;
+/// Of the light, in a place where it can be changed.
+RadianceImage& Optics::own(const RadianceImage& light) noexcept {
   if (&light != &net_) {
     net_.resize(light.width(), light.height());
     std::ranges::copy(light.pixels(), net_.pixels().begin());
   }
+  return net_;
+}
+
+/// What is no number made dark: one cell's would spread over the whole transform.
+const RadianceImage& Optics::without_broken(const RadianceImage& light,
+                                            const Survey& found) noexcept {
+  if (found.broken == 0) return light;
+  for (float& cell : own(light).pixels()) cell = std::isfinite(cell) ? cell : 0.0F;
+  return net_;
+}
+
+/// Makes points of cells so bright that the rounding of their transform would be seen; of too many
+/// none, for then what they light up is as bright; nor out of focus, where their light is thin.
+/// Their wings are FarWings' business.
+const RadianceImage& Optics::take_bright_cells(const Radiance& in, const RadianceImage& light,
+                                               const Survey& found) noexcept {
+  bright_.clear();
+  if (found.bright == 0 || found.bright > kMostBright || defocus_m_ != 0.0 || !wings_apart())
+    return light;
+  own(light);
   const double cell_px = 1.0 / kOversampling;
   const double cell_sr = std::pow(spec_.camera.ifov_rad() * cell_px, 2);
   for (int y = 0; y < net_.height(); ++y) {
     for (int x = 0; x < net_.width(); ++x) {
       float& cell = net_.at(x, y);
-      if (!is_bright(cell)) continue;
+      if (std::abs(cell) <= found.bright_limit) continue;
       bright_.push_back(
           {{in.region.left + (x - 1.0) * cell_px, in.region.top + (y - 1.0) * cell_px},
            static_cast<double>(cell) * cell_sr,
@@ -276,15 +305,16 @@ int Optics::core_margin(double brightest, int blur_px, int reach_px) const noexc
   const double light = 4.0 * brightest * throughput_sr_;
   const double rings_px = std::cbrt(kRings * wing_law_.share_px * light / faint_w_m2_);
   const double least_px = std::min(least_core_px_ + 2 * blur_px, kLargestCore_px);
-  const double px = spec_.lens.spider_vanes > 0 ? reach_px : std::ceil(rings_px);
+  const double px = wings_apart() ? std::ceil(rings_px) : reach_px;
   return std::min(reach_px, static_cast<int>(std::clamp(px, least_px, 1.0 * kLargestCore_px)));
 }
 
-void Optics::spread_grid(const RadianceImage& light, const PixelRect& region, double brightest,
+void Optics::spread_grid(const RadianceImage& light, const PixelRect& region, const Survey& found,
                          int blur_px, const Smear& smear, OpticsReport& report,
                          IrradianceImage& out) noexcept {
-  report.core_px = core_margin(brightest, blur_px, report.wing_px);
-  const bool with_wings = report.core_px < report.wing_px && spec_.lens.spider_vanes == 0;
+  const float brightest = bright_.empty() ? found.most : found.most_dim;
+  report.core_px = core_margin(static_cast<double>(brightest), blur_px, report.wing_px);
+  const bool with_wings = wings_apart() && (report.core_px < report.wing_px || !bright_.empty());
   const PixelPoint piece = smear.piece_px();
   const auto margin = [&](double motion) {
     return report.core_px + static_cast<int>(std::ceil(std::abs(motion) / 2.0));

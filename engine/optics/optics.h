@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <vector>
 
@@ -38,8 +39,7 @@ struct OpticsReport {
 /// that the target hides of it: a spread of sigma px adds sigma^2 / 2 times the second derivative,
 /// 1e-8 of its light in the paper's camera, 1e-3 in one of 20 deg at the limb; a limb sharper than
 /// a pixel stays so. Leaves out: distortion, vignetting; of a spider's spikes what is beyond 64 px.
-/// Thread: loop.
-/// Loop-safe but for the constructor.
+/// Thread: loop. Loop-safe but for the constructor.
 class Optics {
  public:
   Optics(const OpticsSpec& spec, double faint_w_m2, WorkerPool& pool);
@@ -78,15 +78,37 @@ class Optics {
     }
   };
 
+  /// What there is on a grid, by size: the light itself, less what is hidden, may be negative.
+  struct Survey {
+    double sum = 0;
+    float most = 0;
+    float most_dim = 0;  ///< of cells that are not so bright that they must be points
+    int bright = 0;
+    int broken = 0;  ///< cells that are no number
+    float bright_limit = 0;
+    void add(const Survey& o) noexcept {
+      sum += o.sum;
+      most = std::max(most, o.most);
+      most_dim = std::max(most_dim, o.most_dim);
+      bright += o.bright;
+      broken += o.broken;
+    }
+  };
+
   void tabulate() noexcept;
   void focus(double defocus_m) noexcept;
   void fill_background(const Radiance& in, IrradianceImage& out) noexcept;
   const RadianceImage& net_light(const Radiance& in) noexcept;
-  [[nodiscard]] double flux_of(const Radiance& in) const noexcept;
-  const RadianceImage& take_bright_cells(const Radiance& in, const RadianceImage& light) noexcept;
+  Survey survey(const RadianceImage& light) noexcept;
+  RadianceImage& own(const RadianceImage& light) noexcept;
+  const RadianceImage& without_broken(const RadianceImage& light, const Survey& found) noexcept;
+  const RadianceImage& take_bright_cells(const Radiance& in, const RadianceImage& light,
+                                         const Survey& found) noexcept;
   [[nodiscard]] int core_margin(double brightest, int blur_px, int reach_px) const noexcept;
   [[nodiscard]] static int longest_px(const OpticsSpec& spec) noexcept;
-  void spread_grid(const RadianceImage& light, const PixelRect& region, double brightest,
+  /// A spider's spikes are none of FarWings'.
+  [[nodiscard]] bool wings_apart() const noexcept { return spec_.lens.spider_vanes == 0; }
+  void spread_grid(const RadianceImage& light, const PixelRect& region, const Survey& found,
                    int blur_px, const Smear& smear, OpticsReport& report,
                    IrradianceImage& out) noexcept;
   void add_core(const PixelRect& grid_px, PixelPoint move_px, int pieces,
@@ -111,6 +133,7 @@ class Optics {
   std::vector<float> core_table_;   ///< without what FarWings spread
   RadianceImage net_;               ///< the target's light without what it hides or what is a point
   std::vector<float> behind_;       ///< the background's pixels, row by row of the region
+  std::vector<Survey> rows_;
   std::vector<PointSource> points_;
   std::vector<PointSource> bright_;  ///< cells
 };

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "engine/core/constants.h"
+#include "engine/optics/lagrange.h"
 #include "engine/optics/mtf.h"
 #include "engine/optics/point_image.h"
 
@@ -39,19 +40,13 @@ DefocusRange defocus_range(const OpticsSpec& spec, const OtfCascade& cascade) no
   };
   const double far = std::numeric_limits<double>::infinity();
   DefocusRange range;
-  if (spec.stars) range.low_m = std::min(0.0, seen(far, kNearest_m));
+  // Beyond what the lens is focused at are the stars, or a target that is not what it is focused
+  // at.
+  if (spec.stars || spec.focus == Focus::kDistance)
+    range.low_m = std::min(0.0, seen(far, kNearest_m));
   if (spec.focus != Focus::kTarget) range.high_m = std::max(0.0, seen(kNearest_m, far));
   const double most_m = PointSplat::kMostDefocus_waves * middle_wavelength_m(spec);
   return {std::max(range.low_m, -most_m), std::min(range.high_m, most_m)};
-}
-
-/// Lagrange's cubic through four places -1, 0, 1, 2 at t in [0, 1).
-std::array<float, 4> cubic(double t) noexcept {
-  const double a = t + 1.0;
-  const double b = t - 1.0;
-  const double c = t - 2.0;
-  return {static_cast<float>(-t * b * c / 6.0), static_cast<float>(a * b * c / 2.0),
-          static_cast<float>(-a * t * c / 2.0), static_cast<float>(a * t * b / 6.0)};
 }
 
 constexpr std::array<double, 3> kNodes{-0.7745966692414834, 0.0, 0.7745966692414834};
@@ -264,8 +259,8 @@ void PointSplat::add_core(const Footprint& print, const Level& level, double wei
   const double place_v = (print.v - v) * kPhases;
   const int phase_u = static_cast<int>(std::floor(place_u)) + kPhases / 2;
   const int phase_v = static_cast<int>(std::floor(place_v)) + kPhases / 2;
-  const auto weight_u = cubic(place_u - std::floor(place_u));
-  const auto weight_v = cubic(place_v - std::floor(place_v));
+  const auto weight_u = lagrange_cubic(place_u - std::floor(place_u));
+  const auto weight_v = lagrange_cubic(place_v - std::floor(place_v));
   for (int row = top; row < bottom; ++row) {
     const auto light = static_cast<float>(weight * print.light * share(row - print.v));
     float* pixels = out.row(row).data() + left;

@@ -170,17 +170,73 @@ BENCHMARK(bench_detector_frame)
     ->ArgsProduct({{0, 1, 8, 15, 30, 100, 15000}, {11, 16}})
     ->Unit(benchmark::kMillisecond);
 
+/// Optics alone on one thread: a patched disc so many pixels across, smeared by so many.
+void bench_optics(benchmark::State& state) {
+  const starloop::Scenario scenario = flyby();
+  const double to_e = scenario.detector.electrons_per_irradiance(scenario.run.exposure);
+  WorkerPool pool(1);
+  Optics optics(scenario.optics, 0.3 * scenario.detector.noise_e(0.0) / to_e, pool);
+  const auto across = static_cast<int>(state.range(0));
+  Radiance in;
+  const int corner = 512 - across / 2;
+  in.region = {corner, corner, corner + across, corner + across};
+  in.grid.resize(3 * across, 3 * across);
+  in.motion_px = {static_cast<double>(state.range(1)), 0.0};
+  const double bright = 15000.0 / (to_e * optics.throughput_sr());
+  for (int v = 0; v < 3 * across; ++v)
+    for (int u = 0; u < 3 * across; ++u) {
+      const bool lit = std::hypot(u - 1.5 * across, v - 1.5 * across) < 1.5 * across;
+      in.grid.at(u, v) = lit && (u / 40 + v / 33) % 3 != 0 ? static_cast<float>(bright) : 0.0F;
+    }
+  IrradianceImage out;
+  OpticsReport report;
+  for (auto _ : state) report = optics.project(in, out);
+  state.counters["wing_px"] = report.wing_px;
+  state.counters["side_cells"] = 3 * Blur::fast_length(across + 2 * report.core_px);
+}
+BENCHMARK(bench_optics)
+    ->ArgNames({"across_px", "smear_px"})
+    ->ArgsProduct({{1, 10, 60, 110, 130, 800, 1000}, {0}})
+    ->ArgsProduct({{110}, {3, 146, 1000}})
+    ->Unit(benchmark::kMillisecond);
+
+/// The bound of bench_optics: one real transform of so many cells a side (side_cells there).
+void bench_transform(benchmark::State& state) {
+  const auto n = static_cast<std::size_t>(state.range(0));
+  const std::vector<int> lengths{static_cast<int>(n)};
+  FourierLines lines(lengths);
+  const std::vector<Lanes> row(n);
+  std::vector<FourierLines::Complex> half(n / 2 + 1);
+  std::vector<FourierLines::Complex> column(n);
+  std::vector<FourierLines::Complex> spectrum((n / 8 + 1) * n);
+  for (auto _ : state) {
+    for (std::size_t y = 0; y < n; y += Lanes::kCount) {
+      lines.forward(std::span(row), std::span(half));
+      // As far as its memory goes, turning rows into columns is part of it.
+      for (std::size_t x = 0; x < n / 2; x += Lanes::kCount)
+        std::copy_n(&half[x], Lanes::kCount, &spectrum[x / Lanes::kCount * n + y]);
+    }
+    for (std::size_t g = 0; g <= n / 8; ++g) {
+      const auto line = std::span(spectrum).subspan(g * n, n);
+      lines.forward(std::span<const FourierLines::Complex>(line), std::span(column));
+      std::ranges::copy(column, line.begin());
+    }
+    benchmark::ClobberMemory();
+  }
+}
+BENCHMARK(bench_transform)
+    ->ArgName("cells")
+    ->Arg(432)
+    ->Arg(480)
+    ->Arg(2592)
+    ->Arg(3240)
+    ->Unit(benchmark::kMillisecond);
+
 /// A frame of the paper's pass, so many seconds after its closest point; stages as counters.
 void expose_flyby(benchmark::State& state, const starloop::Scenario& scenario, double after_s,
                   int threads) {
   starloop::Rig rig(scenario, threads);
-  hil::ScriptedPointing pointing = rig.prediction();
-  Shot shot;
-  shot.shutter_open = sim_time(309781.706 + after_s);
-  shot.exposure = scenario.run.exposure;
-  shot.attitude = {pointing.attitude(shot.shutter_open),
-                   pointing.attitude(shot.shutter_open + shot.exposure / 2),
-                   pointing.attitude(shot.shutter_open + shot.exposure)};
+  Shot shot = rig.predicted_shot(sim_time(309781.706 + after_s), scenario.run.exposure);
   DnImage image(scenario.scene.camera.width_px, scenario.scene.camera.height_px);
   TruthMask mask;
   FrameReport report;

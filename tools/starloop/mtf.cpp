@@ -17,18 +17,6 @@ namespace {
 
 constexpr int kRows = 400;  // a direction
 
-/// The geometry of the frame whose shutter opens then, the camera following its prediction.
-engine::Snapshot snapshot_at(const Scenario& scenario, const Rig& rig, double time_s) {
-  hil::ScriptedPointing pointing = rig.prediction();
-  engine::Shot shot;
-  shot.shutter_open = engine::sim_time(time_s);
-  shot.exposure = scenario.run.exposure;
-  shot.attitude = {pointing.attitude(shot.shutter_open),
-                   pointing.attitude(shot.shutter_open + shot.exposure / 2),
-                   pointing.attitude(shot.shutter_open + shot.exposure)};
-  return engine::SnapshotBuilder(scenario.scene, rig.camera(), rig.target()).build(shot);
-}
-
 void write_direction(std::ofstream& csv, const engine::OpticsSpec& optics,
                      const engine::OtfCascade& cascade, const engine::OtfCascade::Focused& focused,
                      const engine::PixelPoint& smear_px, double direction_deg) {
@@ -54,7 +42,9 @@ int export_mtf(const CommonOptions& options, const MtfOptions& mtf) {
       mtf.time_s >= 0.0 ? mtf.time_s : engine::seconds(chosen_pass(scenario).closest);
   scenario.run.pattern = true;  // no renderer is wanted, only where things are
   const Rig rig(scenario, 1);
-  const engine::Snapshot snapshot = snapshot_at(scenario, rig, time_s);
+  const engine::Snapshot snapshot =
+      engine::SnapshotBuilder(scenario.scene, rig.camera(), rig.target())
+          .build(rig.predicted_shot(engine::sim_time(time_s), scenario.run.exposure));
   const engine::OtfCascade cascade(scenario.optics);
   const double asked_m = scenario.optics.defocus_m(snapshot.range_m, snapshot.range_m);
   const double defocus_m = cascade.seen_defocus_m(asked_m);

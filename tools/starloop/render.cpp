@@ -53,6 +53,7 @@ std::vector<engine::FitsCard> header_of(const Scenario& s, double time_s,
       {"BOUNCES", static_cast<long long>(r.render.bounces), "indirect"},
       {"WINGPX", static_cast<long long>(r.optics.wing_px),
        "[px] how far light's spread is followed"},
+      {"DEFOCUS", r.optics.defocus_m, "[m] W20 of the target, of path; 0 when nobody sees it"},
       {"STARS", static_cast<long long>(r.stars.in_frame), "in the frame, bright enough to be seen"},
   };
 }
@@ -81,6 +82,16 @@ void tell(const std::string& fits, const std::string& png, const Scenario& scena
     if (!rung.ladder.empty())
       std::printf("%s: %s%s\n", std::string(rung.ladder).c_str(), std::string(rung.taken).c_str(),
                   left_out(rung).c_str());
+  const engine::OpticsReport& optics = report.optics;
+  if (optics.wing_px > 0)
+    std::printf(
+        "optics: light followed for %d px, on the fine grid %d; %.2f %% of a point's beyond; "
+        "the target %.0f nm of path out of focus\n",
+        optics.wing_px, optics.core_px, 100.0 * optics.lost_flux_share, optics.defocus_m * 1e9);
+  const engine::DetectorReport& detector = report.detector;
+  std::printf(
+      "detector: %d px over the full well, %d cosmic rays, %d px whose light was no number\n",
+      detector.full_well_px, detector.cosmic_rays, detector.no_light_px);
   if (!star_text.empty()) {
     const engine::StarReport& stars = report.stars;
     std::printf(
@@ -120,13 +131,7 @@ int render_frames(const CommonOptions& options, const RenderOptions& render) {
   for (std::size_t i = 0; i < render.times_s.size(); ++i) {
     const double time_s = render.times_s[i];
     Rig rig(scenario, options.threads);
-    hil::ScriptedPointing pointing = rig.prediction();
-    engine::Shot shot;
-    shot.shutter_open = engine::sim_time(time_s);
-    shot.exposure = scenario.run.exposure;
-    shot.attitude = {pointing.attitude(shot.shutter_open),
-                     pointing.attitude(shot.shutter_open + shot.exposure / 2),
-                     pointing.attitude(shot.shutter_open + shot.exposure)};
+    const engine::Shot shot = rig.predicted_shot(engine::sim_time(time_s), scenario.run.exposure);
     engine::TruthMask mask;
     engine::DnImage frame(scenario.scene.camera.width_px, scenario.scene.camera.height_px);
     const engine::FrameReport report = rig.generator().expose(shot, engine::Budget{}, frame, mask);

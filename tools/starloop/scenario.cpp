@@ -351,6 +351,16 @@ std::vector<engine::Companion> Rig::move_companions(const Scenario& scenario) {
   return moving;
 }
 
+engine::Shot Rig::predicted_shot(engine::SimTime open, engine::Duration exposure) const {
+  hil::ScriptedPointing pointing = prediction();
+  engine::Shot shot;
+  shot.shutter_open = open;
+  shot.exposure = exposure;
+  shot.attitude = {pointing.attitude(open), pointing.attitude(open + exposure / 2),
+                   pointing.attitude(open + exposure)};
+  return shot;
+}
+
 hil::ScriptedPointing Rig::prediction() const {
   return {camera_, target_, epoch_, path_, roll_, boresight_};
 }

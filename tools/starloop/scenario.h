@@ -124,6 +124,8 @@ class Rig {
   [[nodiscard]] engine::SceneGenerator& generator() noexcept { return *generator_; }
   /// Without an error.
   [[nodiscard]] hil::ScriptedPointing prediction() const;
+  /// Whose shutter opens then, the camera following that.
+  [[nodiscard]] engine::Shot predicted_shot(engine::SimTime open, engine::Duration exposure) const;
   /// As far as the target's orbit is known.
   [[nodiscard]] hil::ScriptedPointing believed() const;
   [[nodiscard]] const engine::KeplerPropagator& camera() const noexcept { return camera_; }

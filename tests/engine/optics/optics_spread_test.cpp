@@ -2,6 +2,7 @@
 // and what is out of focus. Throughput, places and laws of the small: optics_test.cpp.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -9,12 +10,15 @@
 #include "engine/core/constants.h"
 #include "engine/optics/optics.h"
 #include "tests/support/exact_spread.h"
+#include "tests/support/projected.h"
 #include "tests/support/scenes.h"
 
 namespace engine {
 namespace {
 
 using test_support::ExactSpread;
+using test_support::project;
+using test_support::Projected;
 using test_support::small_camera;
 
 constexpr int kSide_px = 512;
@@ -23,25 +27,6 @@ OpticsSpec spec_of(int side_px = kSide_px) {
   OpticsSpec spec;
   spec.camera = small_camera(side_px);
   return spec;
-}
-
-struct Projected {
-  IrradianceImage image;
-  OpticsReport report;
-  [[nodiscard]] double at(int u, int v) const { return static_cast<double>(image.at(u, v)); }
-  [[nodiscard]] double sum() const {
-    double total = 0;
-    for (const float x : image.pixels()) total += static_cast<double>(x);
-    return total;
-  }
-};
-
-Projected project(const Radiance& in, const OpticsSpec& spec, double faint_w_m2, int threads = 1) {
-  WorkerPool pool(threads);
-  Optics optics(spec, faint_w_m2, pool);
-  Projected out;
-  out.report = optics.project(in, out.image);
-  return out;
 }
 
 Radiance dark_over(PixelRect region) {
@@ -165,6 +150,61 @@ TEST(OpticsSpread, ABrightCellIsSpreadAsADimOneIs) {
     }
     EXPECT_LT(worst, 1e-3 * peak) << cell;
   }
+}
+
+TEST(OpticsSpread, ABrightCellKeepsItsLightHoweverTheLensBlurs) {
+  // Wings that others were to spread must have been spread: they are 6 % of it.
+  OpticsSpec shaken = spec_of(256);
+  shaken.jitter_rad = 3.0 * shaken.camera.ifov_rad();
+  OpticsSpec spider = spec_of(256);
+  spider.lens.spider_vanes = 4;
+  spider.lens.spider_width_m = 5e-3;
+  for (const OpticsSpec& spec : {spec_of(256), shaken, spider}) {
+    const double e = throughput_sr(spec) / 15000.0;
+    Radiance in = dark_over({120, 120, 136, 136});
+    const double cell_e = 2.0 * 1e6 * 0.3 * 4.7;
+    in.grid.at(24, 24) = static_cast<float>(cell_e * 9.0 / 15000.0);
+    const Projected out = project(in, spec, 0.3 * 4.7 * e);
+    // What lies further than the light is followed, and what the frame's edge cuts off besides.
+    EXPECT_NEAR(out.sum() / e / cell_e, 1.0, out.report.lost_flux_share + 0.003)
+        << spec.jitter_rad << " " << spec.lens.spider_vanes;
+    EXPECT_LE(out.report.core_px, out.report.wing_px);
+  }
+}
+
+TEST(OpticsSpread, ACellThatIsNoNumberCostsItsOwnLightOnly) {
+  const OpticsSpec spec = spec_of(256);
+  const double e = throughput_sr(spec) / 15000.0;
+  Radiance in = patched_disc(40, 128);
+  in.grid.at(50, 50) = 0.0F;
+  in.grid.at(51, 50) = 0.0F;
+  const Projected want = project(in, spec, e);
+  in.grid.at(50, 50) = std::numeric_limits<float>::quiet_NaN();
+  in.grid.at(51, 50) = std::numeric_limits<float>::infinity();
+  const Projected got = project(in, spec, e);
+  EXPECT_TRUE(std::ranges::equal(want.image.pixels(), got.image.pixels()));
+  // Nor does a motion that is none: the target is gone, the frame is whole.
+  in.motion_px = {1.0, std::numeric_limits<double>::quiet_NaN()};
+  EXPECT_EQ(project(in, spec, e).sum(), 0.0);
+}
+
+TEST(OpticsSpread, WhatIsBeyondTheFocusIsAsBlurredAsWhatIsNearer) {
+  // 1/Z - 1/Zf of the same size either way.
+  OpticsSpec spec = spec_of(256);
+  spec.focus = Focus::kDistance;
+  spec.focus_range_m = 100e3;
+  const auto peak = [&](double range_m) {
+    Radiance in = dark_over({128, 128, 129, 129});
+    in.range_m = range_m;
+    in.points.push_back({{128.0, 128.0}, 1.0, {}});
+    return project(in, spec, 1e-7 * throughput_sr(spec) / std::pow(spec.camera.ifov_rad(), 2))
+        .highest();
+  };
+  const double sharp = peak(100e3);
+  const double beyond = peak(300e3);
+  EXPECT_LT(beyond, 0.93 * sharp);
+  // Blended from other levels on either side: 3e-3 of the light (PointSplat), its peak a third.
+  EXPECT_NEAR(beyond / peak(60e3), 1.0, 0.01);
 }
 
 TEST(OpticsSpread, OutOfFocusIsTheExactImageOfItsRange) {

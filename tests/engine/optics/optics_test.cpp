@@ -9,12 +9,14 @@
 
 #include "engine/core/constants.h"
 #include "engine/optics/mtf.h"
+#include "tests/support/projected.h"
 #include "tests/support/scenes.h"
 
 namespace engine {
 namespace {
 
 using Eigen::Vector3d;
+using test_support::Projected;
 using test_support::small_camera;
 
 constexpr int kSide_px = 512;
@@ -28,31 +30,9 @@ OpticsSpec spec_of(int side_px = kSide_px) {
   return spec;
 }
 
-struct Projected {
-  IrradianceImage image;
-  OpticsReport report;
-
-  [[nodiscard]] double at(int u, int v) const { return static_cast<double>(image.at(u, v)); }
-  [[nodiscard]] double sum() const {
-    double total = 0;
-    for (const float x : image.pixels()) total += static_cast<double>(x);
-    return total;
-  }
-  [[nodiscard]] double lowest() const {
-    return static_cast<double>(*std::min_element(image.pixels().begin(), image.pixels().end()));
-  }
-  [[nodiscard]] double highest() const {
-    return static_cast<double>(*std::max_element(image.pixels().begin(), image.pixels().end()));
-  }
-};
-
 Projected project(const Radiance& in, int threads = 1, const OpticsSpec& spec = spec_of(),
                   double faint_w_m2 = kFaint_w_m2) {
-  WorkerPool pool(threads);
-  Optics optics(spec, faint_w_m2, pool);
-  Projected out;
-  out.report = optics.project(in, out.image);
-  return out;
+  return test_support::project(in, spec, faint_w_m2, threads);
 }
 
 /// Irradiance on the detector, summed over pixels, that a point of 1 W/m^2 at the pupil makes: its
