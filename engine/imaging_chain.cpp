@@ -114,6 +114,7 @@ FrameReport ImagingChain::expose(const Shot& shot, Budget budget, DnImage& out,
   radiance_.earth.draw(snapshot.earth_in_frame, snapshot.background_w_m2_sr);
   report.render = renderer_->render(snapshot, budget, radiance_);
   radiance_.range_m = snapshot.range_m;
+  radiance_.path = snapshot.path;
   const Duration rendered = now();
   const bool mixed = radiance_.companions_in_sight;
   if (mixed) measure_past_companions(shot.exposure, report.truth, mask);
@@ -123,7 +124,8 @@ FrameReport ImagingChain::expose(const Shot& shot, Budget budget, DnImage& out,
   if (stars_ != nullptr)
     report.stars =
         stars_->add(snapshot, radiance_, radiance_.uniform_w_m2_sr * optics_.throughput_sr(),
-                    optics_.star_defocus_m(snapshot.range_m), irradiance_);
+                    optics_.star_defocus_m(snapshot.range_m), optics_.shading(), irradiance_);
+  optics_.veil(irradiance_);
   const Duration projected = now();
   report.detector =
       detector_.expose(irradiance_, shot.exposure, snapshot.seed, shot.sequence, electrons_);
@@ -168,16 +170,20 @@ void ImagingChain::measure_light(const PixelRect& window, Duration exposure, Fra
   const double dark_e = detector_spec_.dark_mean_e(exposure);
   const bool before_earth = !radiance_.earth.empty();
   const double sky_noise_e = detector_spec_.noise_e(sky * to_e + dark_e);
+  const double least_noise_e =
+      optics_.shading().vignettes() ? detector_spec_.noise_e(dark_e) : sky_noise_e;
   LightSums all;
   double in_mask = 0;
   double variance_e2 = 0;
   const auto throughput = static_cast<float>(optics_.throughput_sr());
+  const bool even = !before_earth && !optics_.shading().vignettes();
   std::ranges::fill(behind_w_m2_, static_cast<float>(sky));
   for (int v = window.top; v < window.bottom; ++v) {
     const auto row = irradiance_.row(v);
-    if (before_earth) {
+    if (!even) {
       std::ranges::fill(behind_w_m2_, static_cast<float>(sky));
       radiance_.earth.add_row(v, 0, throughput, behind_w_m2_);
+      optics_.shading().vignette(v, behind_w_m2_);
     }
     const auto seen = [&](const auto& whole) {
       return whole.subspan(static_cast<std::size_t>(window.left),
@@ -185,13 +191,13 @@ void ImagingChain::measure_light(const PixelRect& window, Duration exposure, Fra
     };
     const double most =
         add_row(seen(row), seen(std::span<const float>(behind_w_m2_)), window.left, v, all);
-    // Noise grows with the background: no pixel of this row stands out of its own.
-    if (most * to_e <= sky_noise_e) continue;
+    // Noise grows with the Earth's light: no pixel of this row stands out of its own.
+    if (most * to_e <= least_noise_e) continue;
     int begin = -1;  // of the run that we are in
     for (int u = window.left; u < window.right; ++u) {
       const double background = static_cast<double>(behind_w_m2_[static_cast<std::size_t>(u)]);
       const double noise_e =
-          before_earth ? detector_spec_.noise_e(background * to_e + dark_e) : sky_noise_e;
+          even ? sky_noise_e : detector_spec_.noise_e(background * to_e + dark_e);
       const double light = static_cast<double>(row[static_cast<std::size_t>(u)]) - background;
       if (std::abs(light) * to_e > noise_e) {
         in_mask += std::abs(light);

@@ -33,7 +33,8 @@ Starlight::Starlight(StarField field, PointSplat& splat, const DetectorSpec& det
 }
 
 StarReport Starlight::add(const Snapshot& snapshot, const Radiance& in, double background_w_m2,
-                          double defocus_m, IrradianceImage& out) noexcept {
+                          double defocus_m, const FieldShading& shading,
+                          IrradianceImage& out) noexcept {
   const double to_e = detector_.electrons_per_irradiance(snapshot.exposure);
   const double dark_e = background_w_m2 * to_e + detector_.dark_mean_e(snapshot.exposure);
   const double e_per_w_m2 = splat_.pixels_per_irradiance() * to_e;
@@ -51,10 +52,10 @@ StarReport Starlight::add(const Snapshot& snapshot, const Radiance& in, double b
   for (PointSource& star : drawn_) {
     const double free = share_beside_target(in, star);
     if (free < 1.0) ++report.dimmed;
-    star.irradiance_w_m2 *= free;
+    star.irradiance_w_m2 *= free * shading.at(star.place);
   }
   splat_.focus(defocus_m);
-  report.lost_flux_share = splat_.add(drawn_, out).lost_flux_share;
+  report.lost_flux_share = splat_.add(drawn_, snapshot.boresight_path, out).lost_flux_share;
   report.near = found.near;
   report.drawn = found.drawn;
   report.faint = found.faint;

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "engine/detector/detector.h"
+#include "engine/optics/field_shading.h"
 #include "engine/optics/point_splat.h"
 #include "engine/render/renderer.h"
 #include "engine/scene/star_field.h"
@@ -41,9 +42,9 @@ class Starlight {
   Starlight(StarField field, PointSplat& splat, const DetectorSpec& detector);
 
   /// Adds the stars to `out`, the blurred image of all else. `in` is what the target's image was
-  /// made of; `defocus_m` is W20 of the stars.
+  /// made of; `defocus_m` is W20 of the stars, and `shading` the lens'.
   StarReport add(const Snapshot& snapshot, const Radiance& in, double background_w_m2,
-                 double defocus_m, IrradianceImage& out) noexcept;
+                 double defocus_m, const FieldShading& shading, IrradianceImage& out) noexcept;
 
  private:
   StarField field_;

@@ -76,16 +76,25 @@ ClosedLoopPointing::ClosedLoopPointing(const ScriptedPointing& prediction,
     : ClosedLoopPointing(prediction, PointingSpec{.error = error, .actuator = actuator}) {}
 
 CameraAttitude ClosedLoopPointing::attitude(SimTime t) noexcept {
-  const bool first = !begun_;
-  const SimTime before = now_;
-  if (first) begin(t);
+  const CameraAttitude attitude = passing(t);
+  history_.add(t, trim_rad());
+  const Matrix3d& axes = attitude.axes.matrix;
+  if (looked_ && t > last_look_)
+    last_rate_rad_s_ = turn_of(axes * last_axes_.transpose()) / engine::seconds(t - last_look_);
+  looked_ = true;
+  last_look_ = t;
+  last_axes_ = axes;
+  return attitude;
+}
+
+CameraAttitude ClosedLoopPointing::passing(SimTime t) noexcept {
+  if (!begun_) begin(t);
   while (under_way_.has_due(t)) {
     const auto [due, order] = under_way_.pop();
     advance_to(std::max(due, now_));
     obey(order);
   }
   advance_to(t);
-  history_.add(t, trim_rad());
 
   CameraAttitude attitude = guidance_.line(t);
   Matrix3d& axes = attitude.axes.matrix;
@@ -95,9 +104,6 @@ CameraAttitude ClosedLoopPointing::attitude(SimTime t) noexcept {
                                        shaken[1] + axes_[1].unseen_rad(), axes_[2].unseen_rad());
   if (!turn.isZero(0.0)) axes = axes_turned(turn) * axes;
   if (!unseen.isZero(0.0)) axes = axes_turned(unseen) * axes;
-  if (!first && t > before)
-    last_rate_rad_s_ = turn_of(axes * last_axes_.transpose()) / engine::seconds(t - before);
-  last_axes_ = axes;
   return attitude;
 }
 

@@ -30,8 +30,8 @@ struct PointingSpec {
 /// until a reference to come it holds.
 /// An attitude command also sets the commanded mode; inertial keeps the attitude of its instant.
 ///
-/// The gyro's true rate is the mean between the last two attitude() calls at different times: in
-/// the frame loop, from the opening of the shutter to mid-exposure.
+/// The gyro's true rate is the mean between the last two attitude() calls at different times,
+/// passing() ones apart: in the frame loop, from the opening of the shutter to mid-exposure.
 /// Thread: loop. Loop-safe once built.
 class ClosedLoopPointing final : public PointingSource {
  public:
@@ -41,6 +41,7 @@ class ClosedLoopPointing final : public PointingSource {
                      const ActuatorSpec& actuator);
 
   [[nodiscard]] engine::CameraAttitude attitude(engine::SimTime t) noexcept override;
+  [[nodiscard]] engine::CameraAttitude passing(engine::SimTime t) noexcept override;
   /// Obeyed after the actuator's delay. Reports, pings and triggers change nothing; what is not
   /// finite or turns faster than two pi a second is refused; a trim replaces the one before.
   void apply(const Command& command) noexcept override;
@@ -87,6 +88,8 @@ class ClosedLoopPointing final : public PointingSource {
 
   bool begun_ = false;
   engine::SimTime now_{};
+  bool looked_ = false;
+  engine::SimTime last_look_{};
   Eigen::Matrix3d last_axes_ = Eigen::Matrix3d::Identity();
   Eigen::Vector3d last_rate_rad_s_ = Eigen::Vector3d::Zero();
 };

@@ -193,11 +193,10 @@ void FrameLoop::expose(std::uint64_t k, std::size_t slot, FrameRecord& record) n
   shot.sequence = k;
   shot.shutter_open = open;
   shot.exposure = spec_.exposure;
-  shot.attitude.open = pointing_.attitude(open);
-  shot.attitude.middle = pointing_.attitude(open + spec_.exposure / 2);
-  record.trim_rad = pointing_.trim_rad();
-  record.measured = pointing_.measured();
-  shot.attitude.close = pointing_.attitude(open + spec_.exposure);
+  shot.attitude = track_over(pointing_, open, spec_.exposure, [&] {
+    record.trim_rad = pointing_.trim_rad();
+    record.measured = pointing_.measured();
+  });
   engine::Budget budget;
   if (spec_.replay != nullptr) {
     budget.passes = spec_.replay->due[next_due_].passes;

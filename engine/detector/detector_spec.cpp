@@ -17,7 +17,7 @@ double DetectorSpec::dark_factor() const noexcept {
 }
 
 double DetectorSpec::dark_mean_e(Duration exposure) const noexcept {
-  return (dark_rate_e_s() + background_e_s) * seconds(exposure);
+  return (dark_rate_e_s() + background_e_s * binning * binning) * seconds(exposure);
 }
 
 double DetectorSpec::noise_e(double mean_e) const noexcept {

@@ -32,7 +32,10 @@ struct DetectorSpec {
   int bits = 11;
   double pedestal_dn = 0;
   Quantiser quantiser = Quantiser::kFloor;
-  double pixel_pitch_m = 6.5e-6;
+  double pixel_pitch_m = 6.5e-6;  ///< of pixels as they are read out
+  /// Photosites on a side of such a pixel: their charge is added up before it is read. Dark current
+  /// and background are a photosite's, full well and read noise the pixel's.
+  int binning = 1;
   double mean_wavelength_m = 626.78e-9;  ///< energy-weighted: sets the energy of a photon
 
   std::uint64_t sensor = 1;   ///< serial number: what its maps are drawn from, whatever the seed
@@ -60,7 +63,10 @@ struct DetectorSpec {
   [[nodiscard]] double electrons_per_irradiance(Duration exposure) const noexcept;
   /// Dark current at temperature_c over that at dark_reference_c.
   [[nodiscard]] double dark_factor() const noexcept;
-  [[nodiscard]] double dark_rate_e_s() const noexcept { return dark_e_s * dark_factor(); }
+  /// Of a pixel.
+  [[nodiscard]] double dark_rate_e_s() const noexcept {
+    return dark_e_s * dark_factor() * binning * binning;
+  }
   /// What an average pixel collects over `exposure` without light, background included.
   [[nodiscard]] double dark_mean_e(Duration exposure) const noexcept;
   /// rms in electrons, of a pixel that collects `mean_e` in all.

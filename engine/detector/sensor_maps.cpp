@@ -76,7 +76,7 @@ void SensorMaps::fill_response(const DetectorSpec& spec) {
 }
 
 void SensorMaps::fill_dark(const DetectorSpec& spec) {
-  const double even_e_s = spec.dark_rate_e_s();
+  const double even_e_s = spec.dark_e_s * spec.dark_factor();
   dark_e_s_.assign(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_),
                    static_cast<float>(even_e_s + spec.background_e_s));
   if (!spec.dsnu_map.path.empty()) {
@@ -126,6 +126,26 @@ void SensorMaps::spoil_columns(const DetectorSpec& spec) {
       }
     }
   }
+}
+
+SensorMaps SensorMaps::binned(int binning) const {
+  ENSURE(binning > 0 && width_ % binning == 0 && height_ % binning == 0);
+  SensorMaps coarse;
+  coarse.width_ = width_ / binning;
+  coarse.height_ = height_ / binning;
+  const auto add_up = [&](const std::vector<float>& from, float share, std::vector<float>& to) {
+    if (from.empty()) return;
+    to.assign(static_cast<std::size_t>(coarse.width_) * static_cast<std::size_t>(coarse.height_),
+              0.0F);
+    for (std::size_t i = 0; i < from.size(); ++i) {
+      const auto fine = static_cast<int>(i);
+      const int pixel = fine / width_ / binning * coarse.width_ + fine % width_ / binning;
+      to[static_cast<std::size_t>(pixel)] += share * from[i];
+    }
+  };
+  add_up(response_, 1.0F / static_cast<float>(binning * binning), coarse.response_);
+  add_up(dark_e_s_, 1.0F, coarse.dark_e_s_);
+  return coarse;
 }
 
 SensorMaps SensorMaps::cut(const PixelRect& window) const {

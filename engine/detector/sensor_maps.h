@@ -21,9 +21,12 @@ class SensorMaps {
  public:
   /// Of a sensor whose pixels are all alike: no memory.
   SensorMaps() = default;
-  /// Throws ConfigError for a map that cannot be read or does not fit the sensor.
+  /// Of photosites. Throws ConfigError for a map that cannot be read or does not fit the sensor.
   SensorMaps(const DetectorSpec& spec, int width, int height);
 
+  /// Of pixels that are so many photosites wide and high: they respond as these do on average, and
+  /// have all their dark current. Pre: the sensor is a whole number of them.
+  [[nodiscard]] SensorMaps binned(int binning) const;
   /// What of it lies in a window. Pre: within the sensor.
   [[nodiscard]] SensorMaps cut(const PixelRect& window) const;
 

@@ -118,18 +118,18 @@ void FarWings::gather(const RadianceImage& picture, const PixelRect& region,
   });
 }
 
-void FarWings::transform(int reach_px, PixelPoint smear_px) noexcept {
-  const auto margin = [&](double smear) {
-    return static_cast<int>(std::ceil((reach_px + 0.5 * std::abs(smear)) / kCell)) + kBeside;
+void FarWings::transform(int reach_px, const ImageMotion& motion) noexcept {
+  const auto margin = [&](double moves_px) {
+    return static_cast<int>(std::ceil((reach_px + moves_px) / kCell)) + kBeside;
   };
-  margin_x_ = margin(smear_px.u);
-  margin_y_ = margin(smear_px.v);
+  margin_x_ = margin(motion.reach_px().u);
+  margin_y_ = margin(motion.reach_px().v);
   Blur::Grid grid;
   grid.left = margin_x_;
   grid.top = margin_y_;
   grid.width = Blur::fast_length(cells_.width() + 2 * margin_x_);
   grid.height = Blur::fast_length(cells_.height() + 2 * margin_y_ + Lanes::kCount);
-  grid_otf_.prepare(table(), grid.height, smear_px);
+  grid_otf_.prepare(table(), grid.height, motion);
   blur_.transform(cells_, grid, grid_otf_);
 }
 

@@ -44,7 +44,7 @@ class FarWings {
   void gather(const RadianceImage& picture, const PixelRect& region, int oversampling) noexcept;
 
   /// Spreads what was gathered, followed for `reach_px`.
-  void transform(int reach_px, PixelPoint smear_px) noexcept;
+  void transform(int reach_px, const ImageMotion& motion) noexcept;
   /// Adds `scale` times the wings, moved by so much, to `out` as far as they are followed.
   void add(PixelPoint move_px, double scale, IrradianceImage& out) noexcept;
 

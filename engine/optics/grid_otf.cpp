@@ -14,10 +14,17 @@ constexpr double kUnseenSmear_px = 1e-3;
 // Below so many turns sin(pi x)/(pi x) loses digits in single precision; its series has them.
 constexpr float kFewTurns = 0.03F;
 
+std::complex<float> wave_of(double turns) noexcept {
+  return std::complex<float>(std::polar(1.0, -2.0 * kPi * turns));
+}
+
 }  // namespace
 
 GridOtf::GridOtf(double cell_px, int averages, int longest)
-    : cell_px_(cell_px), averages_(averages), rows_(static_cast<std::size_t>(longest)) {}
+    : cell_px_(cell_px),
+      averages_(averages),
+      rows_(static_cast<std::size_t>(longest)),
+      row_waves_(static_cast<std::size_t>(longest)) {}
 
 double GridOtf::pixel_factor(double per_px) const noexcept {
   double cell = 1;
@@ -25,30 +32,33 @@ double GridOtf::pixel_factor(double per_px) const noexcept {
   return sinc(per_px) / cell;
 }
 
-void GridOtf::prepare(const RadialOtf& radial, int height, PixelPoint smear_px) noexcept {
+void GridOtf::prepare(const RadialOtf& radial, int height, const ImageMotion& motion) noexcept {
   radial_ = radial;
   directed_.reset();
   cutoff_per_px_ = radial.cutoff_per_px();
-  prepare_rows(height, smear_px);
+  prepare_rows(height, motion);
 }
 
-void GridOtf::prepare(const DirectedOtf& directed, int height, PixelPoint smear_px) noexcept {
+void GridOtf::prepare(const DirectedOtf& directed, int height, const ImageMotion& motion) noexcept {
   directed_.emplace(directed);
   cutoff_per_px_ = directed.cascade.cutoff_per_px();
-  prepare_rows(height, smear_px);
+  prepare_rows(height, motion);
 }
 
-void GridOtf::prepare_rows(int height, PixelPoint smear_px) noexcept {
-  smear_px_ = smear_px;
-  smears_ = std::hypot(smear_px.u, smear_px.v) > kUnseenSmear_px;
+void GridOtf::prepare_rows(int height, const ImageMotion& motion) noexcept {
+  motion_ = motion;
+  smears_ = motion.path.bends || std::hypot(motion.even_px.u, motion.even_px.v) > kUnseenSmear_px;
   for (int k = 0; k < height; ++k) {
     const int wave = k <= height / 2 ? k : k - height;
     const double per_px = static_cast<double>(wave) / (height * cell_px_);
-    const double turns = per_px * smear_px.v;
+    const double turns = per_px * motion.even_px.v;
     rows_[static_cast<std::size_t>(k)] = {
         static_cast<float>(per_px), static_cast<float>(pixel_factor(per_px)),
         static_cast<float>(turns), static_cast<float>(std::sin(kPi * turns)),
         static_cast<float>(std::cos(kPi * turns))};
+    for (int i = 0; motion.path.bends && i < kKnots; ++i)
+      row_waves_[static_cast<std::size_t>(k)][static_cast<std::size_t>(i)] =
+          wave_of(per_px * motion.after(i).v);
   }
 }
 
@@ -71,20 +81,12 @@ GridOtf::Complex GridOtf::unmoved(const Lanes& fu, float fv) const noexcept {
 }
 
 void GridOtf::fill_column(const Lanes& fx, std::span<Complex> out) const noexcept {
-  constexpr int kLanes = Lanes::kCount;
   Lanes per_px;
   Lanes pixel;
-  Lanes turns;
-  Lanes sine;
-  Lanes cosine;
-  for (int c = 0; c < kLanes; ++c) {
+  for (int c = 0; c < Lanes::kCount; ++c) {
     const double f = static_cast<double>(fx.v[c]) / cell_px_;
-    const double t = f * smear_px_.u;
     per_px.v[c] = static_cast<float>(f);
     pixel.v[c] = static_cast<float>(pixel_factor(f));
-    turns.v[c] = static_cast<float>(t);
-    sine.v[c] = static_cast<float>(std::sin(kPi * t));
-    cosine.v[c] = static_cast<float>(std::cos(kPi * t));
   }
   const std::size_t height = out.size();
   for (std::size_t k = 0; k < height; ++k) {
@@ -93,18 +95,93 @@ void GridOtf::fill_column(const Lanes& fx, std::span<Complex> out) const noexcep
     const std::size_t mirrored = height - k;
     out[k] = directed_ || mirrored >= k ? unmoved(per_px, row.per_px) : out[mirrored];
   }
-  for (std::size_t k = 0; k < height; ++k) {
+  for (std::size_t k = 0; k < height; ++k) out[k] *= pixel * Lanes(rows_[k].pixel);
+  if (motion_.path.bends) {
+    follow_path(per_px, out);
+  } else if (smears_) {
+    smear_column(per_px, out);
+  }
+}
+
+void GridOtf::smear_column(const Lanes& per_px, std::span<Complex> out) const noexcept {
+  Lanes turns;
+  Lanes sine;
+  Lanes cosine;
+  for (int c = 0; c < Lanes::kCount; ++c) {
+    const double t = static_cast<double>(per_px.v[c]) * motion_.even_px.u;
+    turns.v[c] = static_cast<float>(t);
+    sine.v[c] = static_cast<float>(std::sin(kPi * t));
+    cosine.v[c] = static_cast<float>(std::cos(kPi * t));
+  }
+  for (std::size_t k = 0; k < out.size(); ++k) {
     const Row& row = rows_[k];
-    Lanes factor = pixel * Lanes(row.pixel);
-    if (smears_) {
-      const Lanes x = turns + Lanes(row.smear);
-      const Lanes wave = sine * Lanes(row.cosine) + cosine * Lanes(row.sine);
-      const Lanes p = Lanes(static_cast<float>(kPi)) * x;
-      const Lanes series = Lanes(1.0F) - p * p * Lanes(1.0F / 6.0F);
-      for (int c = 0; c < kLanes; ++c)
-        factor.v[c] *= std::abs(x.v[c]) < kFewTurns ? series.v[c] : wave.v[c] / p.v[c];
-    }
+    const Lanes x = turns + Lanes(row.smear);
+    const Lanes wave = sine * Lanes(row.cosine) + cosine * Lanes(row.sine);
+    const Lanes p = Lanes(static_cast<float>(kPi)) * x;
+    Lanes factor = Lanes(1.0F) - p * p * Lanes(1.0F / 6.0F);
+    for (int c = 0; c < Lanes::kCount; ++c)
+      if (std::abs(x.v[c]) >= kFewTurns) factor.v[c] = wave.v[c] / p.v[c];
     out[k] *= factor;
+  }
+}
+
+/// The mean of a wave over a straight step is the difference of its ends over the phase between
+/// them: what the waves are at the knots is all that is needed.
+void GridOtf::follow_path(const Lanes& per_px, std::span<Complex> out) const noexcept {
+  constexpr auto kSteps = static_cast<std::size_t>(ImagePath::kSteps);
+  std::array<Complex, kKnots> column;
+  std::array<PixelPoint, kSteps> steps;
+  for (std::size_t i = 0; i < column.size(); ++i) {
+    Lanes re;
+    Lanes im;
+    for (int c = 0; c < Lanes::kCount; ++c) {
+      const auto wave =
+          wave_of(static_cast<double>(per_px.v[c]) * motion_.after(static_cast<int>(i)).u);
+      re.v[c] = wave.real();
+      im.v[c] = wave.imag();
+    }
+    column[i] = Complex(re, im);
+    if (i < kSteps) steps[i] = motion_.step_px(static_cast<int>(i));
+  }
+  const float near_px = per_px.v[0];
+  const auto cutoff = static_cast<float>(cutoff_per_px_);
+  for (std::size_t k = 0; k < out.size(); ++k) {
+    const Row& row = rows_[k];
+    if (row.per_px * row.per_px + near_px * near_px > cutoff * cutoff) continue;
+    const Waves& waves = row_waves_[k];
+    const auto at_knot = [&](std::size_t i) {
+      const Lanes a(waves[i].real());
+      const Lanes b(waves[i].imag());
+      return Complex(column[i].real() * a - column[i].imag() * b,
+                     column[i].real() * b + column[i].imag() * a);
+    };
+    Lanes re;
+    Lanes im;
+    Complex before = at_knot(0);
+    for (std::size_t i = 0; i < kSteps; ++i) {
+      const Complex after = at_knot(i + 1);
+      const Lanes p =
+          Lanes(kPi) * (per_px * Lanes(steps[i].u) + Lanes(row.per_px) * Lanes(steps[i].v));
+      // Of few turns: the mean of the ends times sinc over cosine.
+      Lanes mean_re =
+          (before.real() + after.real()) * Lanes(0.5F) * (Lanes(1.0F) + p * p * Lanes(1.0F / 3.0F));
+      Lanes mean_im =
+          (before.imag() + after.imag()) * Lanes(0.5F) * (Lanes(1.0F) + p * p * Lanes(1.0F / 3.0F));
+      const Lanes rise_re = after.real() - before.real();
+      const Lanes rise_im = after.imag() - before.imag();
+      for (int c = 0; c < Lanes::kCount; ++c) {
+        if (std::abs(p.v[c]) < static_cast<float>(kPi) * kFewTurns) continue;
+        mean_re.v[c] = -0.5F * rise_im.v[c] / p.v[c];
+        mean_im.v[c] = 0.5F * rise_re.v[c] / p.v[c];
+      }
+      re += mean_re;
+      im += mean_im;
+      before = after;
+    }
+    const Lanes share(1.0F / ImagePath::kSteps);
+    const Lanes a = out[k].real();
+    const Lanes b = out[k].imag();
+    out[k] = Complex(share * (a * re - b * im), share * (a * im + b * re));
   }
 }
 

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
+#include <complex>
 #include <optional>
 #include <span>
 #include <vector>
@@ -8,6 +10,7 @@
 #include "engine/core/image.h"
 #include "engine/optics/fourier.h"
 #include "engine/optics/otf_cascade.h"
+#include "engine/scene/image_motion.h"
 
 namespace engine {
 
@@ -36,8 +39,9 @@ struct DirectedOtf {
 };
 
 /// The product of an image's OTFs at the frequencies of a grid: one of the two above, the pixel's
-/// square, and a straight smear. A cell of the grid is itself an average; that is taken back out.
-/// Thread: loop; fill_column() any. Loop-safe but for the constructor.
+/// square, and motion: a straight smear, or a path of straight steps. A cell of the grid is itself
+/// an average; that is taken back out. Thread: loop; fill_column() any. Loop-safe but for the
+/// constructor.
 class GridOtf {
  public:
   using Complex = FourierLines::Complex;
@@ -49,8 +53,8 @@ class GridOtf {
 
   /// For grids of this height in cells. What the first argument names is looked at until the next
   /// call.
-  void prepare(const RadialOtf& radial, int height, PixelPoint smear_px) noexcept;
-  void prepare(const DirectedOtf& directed, int height, PixelPoint smear_px) noexcept;
+  void prepare(const RadialOtf& radial, int height, const ImageMotion& motion) noexcept;
+  void prepare(const DirectedOtf& directed, int height, const ImageMotion& motion) noexcept;
 
   /// Cycles per cell beyond which it is 0.
   [[nodiscard]] double cutoff() const noexcept { return cutoff_per_px_ * cell_px_; }
@@ -68,17 +72,24 @@ class GridOtf {
     float cosine = 1;
   };
   [[nodiscard]] double pixel_factor(double per_px) const noexcept;
-  void prepare_rows(int height, PixelPoint smear_px) noexcept;
+  static constexpr int kKnots = ImagePath::kSteps + 1;
+  /// Waves at the knots of a path, for one frequency of an axis.
+  using Waves = std::array<std::complex<float>, kKnots>;
+
+  void prepare_rows(int height, const ImageMotion& motion) noexcept;
   [[nodiscard]] Complex unmoved(const Lanes& fu, float fv) const noexcept;
+  void smear_column(const Lanes& per_px, std::span<Complex> out) const noexcept;
+  void follow_path(const Lanes& per_px, std::span<Complex> out) const noexcept;
 
   double cell_px_;
   int averages_;
   double cutoff_per_px_ = 0;
   RadialOtf radial_;  ///< or, of a directed one, what it is less
   std::optional<DirectedOtf> directed_;
-  PixelPoint smear_px_;
+  ImageMotion motion_;
   bool smears_ = false;
   std::vector<Row> rows_;
+  std::vector<Waves> row_waves_;  ///< of a path
 };
 
 }  // namespace engine

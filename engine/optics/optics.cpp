@@ -69,6 +69,7 @@ WingLaw wing_law_of(const OpticsSpec& spec) noexcept {
 
 Optics::Optics(const OpticsSpec& spec, double faint_w_m2, WorkerPool& pool)
     : spec_(spec),
+      oversampling_(spec.oversampling),
       cascade_(spec),
       focused_(cascade_.focused(0.0)),
       wing_law_(wing_law_of(spec)),
@@ -76,33 +77,34 @@ Optics::Optics(const OpticsSpec& spec, double faint_w_m2, WorkerPool& pool)
       throughput_sr_(engine::throughput_sr(spec)),
       faint_w_m2_(faint_w_m2),
       pool_(pool),
+      shading_(spec),
       wings_(wing_law_, width_of_point(spec), longest_px(spec) + 2 * spec.largest_wing_px, pool),
-      core_(longest_px(spec) + 2 * kLargestCore_px, kOversampling, pool),
-      core_otf_(1.0 / kOversampling, 1,
-                kOversampling * Blur::fast_length(longest_px(spec) + 2 * kLargestCore_px)),
+      core_(longest_px(spec) + 2 * kLargestCore_px, spec.oversampling, pool),
+      core_otf_(1.0 / spec.oversampling, 1,
+                spec.oversampling * Blur::fast_length(longest_px(spec) + 2 * kLargestCore_px)),
       least_core_px_(static_cast<int>(std::lround(kCore_px * width_of_point(spec)))),
       splat_(std::make_unique<PointSplat>(spec, cascade_, faint_w_m2, pool)),
-      cell_splat_(spec, cascade_, faint_w_m2, pool, {1.0 / kOversampling, &wings_}),
+      cell_splat_(spec, cascade_, faint_w_m2, pool, {1.0 / spec.oversampling, &wings_}),
       whole_table_(kTableSteps + 2),
       core_table_(kTableSteps + 2) {
   tabulate();
   const PixelRect most = spec.camera.frame().grown_by(wish().beyond_frame_px);
-  net_.reserve(most.width() * kOversampling, most.height() * kOversampling);
+  net_.reserve(most.width() * oversampling_, most.height() * oversampling_);
   behind_.resize(at(most.width()) * at(most.height()));
   points_.reserve(Radiance::kMostPoints);
   bright_.reserve(at(kMostBright));
-  rows_.reserve(at(most.height() * kOversampling));
+  rows_.reserve(at(most.height() * oversampling_));
 }
 
 /// Of a picture's side: light from beyond the frame, too, and a piece of smear.
 int Optics::longest_px(const OpticsSpec& spec) noexcept {
   return std::max(spec.camera.width_px, spec.camera.height_px) +
-         2 * std::min(kBeyondFrame_px, spec.largest_wing_px) + static_cast<int>(kLongestPiece_px) +
-         8;
+         2 * std::min(kBeyondFrame_px, spec.largest_wing_px) +
+         2 * static_cast<int>(kLongestPiece_px) + 8;
 }
 
 GridWish Optics::wish() const noexcept {
-  return {kOversampling, std::min(kBeyondFrame_px, spec_.largest_wing_px)};
+  return {oversampling_, std::min(kBeyondFrame_px, spec_.largest_wing_px)};
 }
 
 double Optics::noise_blur_px() const noexcept {
@@ -143,8 +145,15 @@ void Optics::focus(double defocus_m) noexcept {
 }
 
 OpticsReport Optics::project(const Radiance& in, IrradianceImage& out) noexcept {
-  ENSURE(in.oversampling == kOversampling);
+  ENSURE(in.oversampling == oversampling_);
   fill_background(in, out);
+  const OpticsReport report = spread(in, out);
+  shading_.vignette(out, pool_);
+  return report;
+}
+
+/// The target's light.
+OpticsReport Optics::spread(const Radiance& in, IrradianceImage& out) noexcept {
   OpticsReport report;
   if (in.region.empty()) return report;
 
@@ -153,7 +162,7 @@ OpticsReport Optics::project(const Radiance& in, IrradianceImage& out) noexcept 
   report.defocus_m = defocus_m_;
   const RadianceImage& net = net_light(in);
   const Survey found = survey(net);
-  double flux = found.sum * throughput_sr_ / (kOversampling * kOversampling);
+  double flux = found.sum * throughput_sr_ / (oversampling_ * oversampling_);
   for (const PointSource& p : in.points)
     flux += p.irradiance_w_m2 * splat_->pixels_per_irradiance();
   const int blur_px =
@@ -166,26 +175,37 @@ OpticsReport Optics::project(const Radiance& in, IrradianceImage& out) noexcept 
       static_cast<int>(std::clamp(wing_px, least_px, std::max(1.0 * largest_px, least_px)));
   report.lost_flux_share = 2.0 * kPi * wing_law_.share_px / report.wing_px;
 
-  const double length_px = std::hypot(in.motion_px.u, in.motion_px.v);
-  if (!(length_px < kLongestSmear_px)) return report;  // too thin for any detector
-  const Smear smear{in.motion_px,
-                    static_cast<int>(std::max(std::ceil(length_px / kLongestPiece_px), 1.0))};
+  const ImageMotion motion{in.motion_px, in.path};
+  const PixelPoint moves_px = motion.reach_px();
+  // Not a number, or too thin for any detector.
+  if (!(std::hypot(moves_px.u, moves_px.v) < 0.5 * kLongestSmear_px)) return report;
   const RadianceImage& whole = without_broken(net, found);
-  if (wings_apart()) wings_.gather(whole, in.region, kOversampling);
+  if (wings_apart()) wings_.gather(whole, in.region, oversampling_);
   const RadianceImage& light = take_bright_cells(in, whole, found);
   points_.assign(in.points.begin(), in.points.end());
   for (PointSource& p : points_) p.motion_px = in.motion_px;
   report.points = static_cast<int>(points_.size() + bright_.size());
-  if (found.sum > 0.0) spread_grid(light, in.region, found, blur_px, smear, report, out);
-  splat_->add(points_, out, report.wing_px);
-  cell_splat_.add(bright_, out);
-  const auto margin = [&](double motion) {
-    return report.wing_px + static_cast<int>(std::ceil(std::abs(motion) / 2.0));
+  const auto spread = [&](const Stroke& stroke) {
+    if (found.sum > 0.0) spread_grid(light, in.region, found, blur_px, stroke, report, out);
   };
+  report.segments = 0;
+  if (!in.path.bends) {
+    spread(straight(in.motion_px, {}, 1.0));
+  } else if (std::max(moves_px.u, moves_px.v) <= kLongestPiece_px) {
+    spread({motion, {}, {}, 1, 1.0});
+  } else {
+    for (int i = 0; i < ImagePath::kSteps; ++i)
+      spread(straight(motion.step_px(i), motion.middle_of(i), 1.0 / ImagePath::kSteps));
+  }
+  report.segments = std::max(report.segments, 1);
+  splat_->add(points_, in.path, out, report.wing_px);
+  cell_splat_.add(bright_, in.path, out);
+  const int margin_u = report.wing_px + static_cast<int>(std::ceil(moves_px.u));
+  const int margin_v = report.wing_px + static_cast<int>(std::ceil(moves_px.v));
   const PixelRect& r = in.region;
-  report.window = PixelRect{r.left - margin(in.motion_px.u), r.top - margin(in.motion_px.v),
-                            r.right + margin(in.motion_px.u), r.bottom + margin(in.motion_px.v)}
-                      .clipped_to(spec_.camera.frame());
+  report.window =
+      PixelRect{r.left - margin_u, r.top - margin_v, r.right + margin_u, r.bottom + margin_v}
+          .clipped_to(spec_.camera.frame());
   // Of a target beside the frame that has no columns, or no rows.
   if (report.window.empty()) report.window = PixelRect{};
   return report;
@@ -203,7 +223,7 @@ void Optics::fill_background(const Radiance& in, IrradianceImage& out) noexcept 
 /// What of the light there is, whatever its sign; what is no number is none.
 Optics::Survey Optics::survey(const RadianceImage& light) noexcept {
   const auto limit =
-      static_cast<float>(kBright * faint_w_m2_ * kOversampling * kOversampling / throughput_sr_);
+      static_cast<float>(kBright * faint_w_m2_ * oversampling_ * oversampling_ / throughput_sr_);
   rows_.resize(at(light.height()));
   pool_.rows(0, light.height(), [&](int y) {
     constexpr std::size_t kSums = 8;  // side by side, for the processor has room for them
@@ -246,12 +266,12 @@ const RadianceImage& Optics::net_light(const Radiance& in) noexcept {
     const auto behind = std::span(behind_).subspan(at(v) * width, width);
     std::ranges::fill(behind, static_cast<float>(in.uniform_w_m2_sr));
     in.earth.add_row(in.region.top + v, in.region.left, 1.0F, behind);
-    for (int y = v * kOversampling; y < (v + 1) * kOversampling; ++y) {
+    for (int y = v * oversampling_; y < (v + 1) * oversampling_; ++y) {
       const auto cells = in.grid.row(y);
       const auto cover = in.cover.row(y);
       const auto net = net_.row(y);
       for (std::size_t i = 0; i < net.size(); ++i)
-        net[i] = cells[i] - cover[i] * behind[i / at(kOversampling)];
+        net[i] = cells[i] - cover[i] * behind[i / at(oversampling_)];
     }
   });
   return net_;
@@ -283,20 +303,26 @@ const RadianceImage& Optics::take_bright_cells(const Radiance& in, const Radianc
   if (found.bright == 0 || found.bright > kMostBright || defocus_m_ != 0.0 || !wings_apart())
     return light;
   own(light);
-  const double cell_px = 1.0 / kOversampling;
+  const double cell_px = 1.0 / oversampling_;
   const double cell_sr = std::pow(spec_.camera.ifov_rad() * cell_px, 2);
   for (int y = 0; y < net_.height(); ++y) {
     for (int x = 0; x < net_.width(); ++x) {
       float& cell = net_.at(x, y);
       if (std::abs(cell) <= found.bright_limit) continue;
       bright_.push_back(
-          {{in.region.left + (x - 1.0) * cell_px, in.region.top + (y - 1.0) * cell_px},
+          {{in.region.left + (x + 0.5) * cell_px - 0.5, in.region.top + (y + 0.5) * cell_px - 0.5},
            static_cast<double>(cell) * cell_sr,
            in.motion_px});
       cell = 0.0F;
     }
   }
   return net_;
+}
+
+Optics::Stroke Optics::straight(PixelPoint line_px, PixelPoint middle_px, double share) noexcept {
+  const double length_px = std::hypot(line_px.u, line_px.v);
+  const int pieces = static_cast<int>(std::max(std::ceil(length_px / kLongestPiece_px), 1.0));
+  return {{{line_px.u / pieces, line_px.v / pieces}, {}}, line_px, middle_px, pieces, share};
 }
 
 /// Up to where the fine grid follows light when FarWings do the rest, which have no rings:
@@ -310,41 +336,42 @@ int Optics::core_margin(double brightest, int blur_px, int reach_px) const noexc
 }
 
 void Optics::spread_grid(const RadianceImage& light, const PixelRect& region, const Survey& found,
-                         int blur_px, const Smear& smear, OpticsReport& report,
+                         int blur_px, const Stroke& stroke, OpticsReport& report,
                          IrradianceImage& out) noexcept {
   const float brightest = bright_.empty() ? found.most : found.most_dim;
   report.core_px = core_margin(static_cast<double>(brightest), blur_px, report.wing_px);
   const bool with_wings = wings_apart() && (report.core_px < report.wing_px || !bright_.empty());
-  const PixelPoint piece = smear.piece_px();
-  const auto margin = [&](double motion) {
-    return report.core_px + static_cast<int>(std::ceil(std::abs(motion) / 2.0));
-  };
-  const int width_px = Blur::fast_length(region.width() + 2 * margin(piece.u));
-  const int height_px = Blur::fast_length(region.height() + 2 * margin(piece.v));
-  const PixelRect grid_px{region.left - margin(piece.u), region.top - margin(piece.v),
-                          region.left - margin(piece.u) + width_px,
-                          region.top - margin(piece.v) + height_px};
-  // The middle cell of a pixel is its centre; it must fall on every third cell of the grid, so the
-  // first cell of the region lies one before.
-  const Blur::Grid grid{width_px * kOversampling, height_px * kOversampling,
-                        margin(piece.u) * kOversampling - 1, margin(piece.v) * kOversampling - 1};
+  const PixelPoint moves_px = stroke.motion.reach_px();
+  const int margin_u = report.core_px + static_cast<int>(std::ceil(moves_px.u));
+  const int margin_v = report.core_px + static_cast<int>(std::ceil(moves_px.v));
+  const int width_px = Blur::fast_length(region.width() + 2 * margin_u);
+  const int height_px = Blur::fast_length(region.height() + 2 * margin_v);
+  const PixelRect grid_px{region.left - margin_u, region.top - margin_v,
+                          region.left - margin_u + width_px, region.top - margin_v + height_px};
+  // The middle cell of a pixel is its centre, and what is sampled: the first of the region lies so
+  // much before. Of an even number it is the one before the centre; add_core() moves by the rest.
+  const int lead = (oversampling_ - 1) / 2;
+  const Blur::Grid grid{width_px * oversampling_, height_px * oversampling_,
+                        margin_u * oversampling_ - lead, margin_v * oversampling_ - lead};
   if (cascade_.radial()) {
     const auto& table = with_wings ? core_table_ : whole_table_;
-    core_otf_.prepare(RadialOtf{table, kTableSteps / cascade_.cutoff_per_px()}, grid.height, piece);
+    core_otf_.prepare(RadialOtf{table, kTableSteps / cascade_.cutoff_per_px()}, grid.height,
+                      stroke.motion);
   } else {
     core_otf_.prepare(DirectedOtf{cascade_, focused_, with_wings ? wings_.table() : RadialOtf{}},
-                      grid.height, piece);
+                      grid.height, stroke.motion);
   }
   core_.transform(light, grid, core_otf_);
-  if (with_wings) wings_.transform(report.wing_px, piece);
-  report.segments = smear.pieces;
-  for (int i = 0; i < smear.pieces; ++i) {
-    add_core(grid_px, smear.centre_px(i), smear.pieces, out);
-    if (with_wings) wings_.add(smear.centre_px(i), throughput_sr_ / smear.pieces, out);
+  if (with_wings) wings_.transform(report.wing_px, stroke.motion);
+  report.segments += stroke.pieces;
+  for (int i = 0; i < stroke.pieces; ++i) {
+    const double share = stroke.share / stroke.pieces;
+    add_core(grid_px, stroke.centre_px(i), share, out);
+    if (with_wings) wings_.add(stroke.centre_px(i), throughput_sr_ * share, out);
   }
 }
 
-void Optics::add_core(const PixelRect& grid_px, PixelPoint move_px, int pieces,
+void Optics::add_core(const PixelRect& grid_px, PixelPoint move_px, double share,
                       IrradianceImage& out) noexcept {
   // Whole pixels move by moving the window, the rest by turning the waves.
   const double whole_u = std::round(move_px.u);
@@ -355,8 +382,10 @@ void Optics::add_core(const PixelRect& grid_px, PixelPoint move_px, int pieces,
       PixelRect{left, top, left + grid_px.width(), top + grid_px.height()}.clipped_to(
           spec_.camera.frame());
   if (seen.empty()) return;
-  core_.sample(kOversampling * (move_px.u - whole_u), kOversampling * (move_px.v - whole_v));
-  const auto scale = static_cast<float>(throughput_sr_ * core_.scale() / pieces);
+  const double to_centre = oversampling_ % 2 == 0 ? 0.5 : 0.0;
+  core_.sample(oversampling_ * (move_px.u - whole_u) - to_centre,
+               oversampling_ * (move_px.v - whole_v) - to_centre);
+  const auto scale = static_cast<float>(throughput_sr_ * core_.scale() * share);
   pool_.rows(seen.top, seen.bottom, [&](int v) {
     const auto from = core_.row(v - top).subspan(at(seen.left - left));
     const auto to = out.row(v).subspan(at(seen.left), at(seen.width()));

@@ -7,6 +7,7 @@
 #include "engine/core/worker_pool.h"
 #include "engine/optics/blur.h"
 #include "engine/optics/far_wings.h"
+#include "engine/optics/field_shading.h"
 #include "engine/optics/grid_otf.h"
 #include "engine/optics/optics_spec.h"
 #include "engine/optics/otf_cascade.h"
@@ -28,17 +29,19 @@ struct OpticsReport {
 
 /// Throughput, then blur by the product of the component OTFs, before the pixels sample.
 ///
-/// L pi/4 (D/f)^2 tau, eq 15 of Li et al. 2023, on a grid of 3 cells to a pixel's side: the optics
-/// pass 178 lp/mm where the pixels end at 77, so a product of MTFs on the pixel grid is 13 % wrong.
+/// L pi/4 (D/f)^2 tau, eq 15 of Li et al. 2023, on a grid of 3 cells to a pixel's side, or as many
+/// as carry what the lens passes: the paper's passes 178 lp/mm where its pixels end at 77, so that
+/// the product of MTFs on the pixel grid (OpticsSpec::oversampling = 1) is 13 % wrong.
 /// Terms: OtfCascade, the target out of focus by its own range, and linear smear. A cell is itself
 /// a square average, and the product takes that back out. The spread of light is followed to where
 /// it drops under `faint_w_m2` (rule B5), or to largest_wing_px: near by on the fine grid, further
 /// out as FarWings. Points, and cells so bright that single precision would show their rounding all
 /// over the window, go by PointSplat. A smear longer than a window is made of segments, each
-/// sampled from the same transform. The Earth behind the target is not blurred but for the pixels
+/// sampled from the same transform; a path that bends is one, too, or beyond a window's reach has
+/// its steps for segments. The Earth behind the target is not blurred but for the pixels
 /// that the target hides of it: a spread of sigma px adds sigma^2 / 2 times the second derivative,
 /// 1e-8 of its light in the paper's camera, 1e-3 in one of 20 deg at the limb; a limb sharper than
-/// a pixel stays so. Leaves out: distortion, vignetting; of a spider's spikes what is beyond 64 px.
+/// a pixel stays so. Leaves out: of a spider's spikes what is beyond 64 px.
 /// Thread: loop. Loop-safe but for the constructor.
 class Optics {
  public:
@@ -58,25 +61,31 @@ class Optics {
   /// What spreads points of light as this does.
   [[nodiscard]] PointSplat& splat() noexcept { return *splat_; }
 
-  /// Overwrites `out`, of the camera's size. Pre: in.oversampling is wish().oversampling.
+  [[nodiscard]] const FieldShading& shading() const noexcept { return shading_; }
+
+  /// Overwrites `out`, of the camera's size: what reaches the detector but veiling glare. Pre:
+  /// in.oversampling is wish().oversampling.
   OpticsReport project(const Radiance& in, IrradianceImage& out) noexcept;
+  /// Veiling glare of all light that there is.
+  void veil(IrradianceImage& out) noexcept { shading_.veil(out, pool_); }
 
  private:
-  static constexpr int kOversampling = 3;
-
-  /// A straight smear, cut into equal pieces.
-  struct Smear {
-    PixelPoint whole_px;
+  /// What one transform is for: a share of the light, with its motion, at equal shares at several
+  /// places a line apart.
+  struct Stroke {
+    ImageMotion motion;    ///< of one piece
+    PixelPoint line_px;    ///< from the beginning of the first piece to the end of the last
+    PixelPoint middle_px;  ///< of the line
     int pieces = 1;
-    [[nodiscard]] PixelPoint piece_px() const noexcept {
-      return {whole_px.u / pieces, whole_px.v / pieces};
-    }
-    /// From the middle of the whole to that of piece `i`.
+    double share = 1;  ///< of the light, all pieces'
     [[nodiscard]] PixelPoint centre_px(int i) const noexcept {
       const double t = (i + 0.5) / pieces - 0.5;
-      return {t * whole_px.u, t * whole_px.v};
+      return {middle_px.u + t * line_px.u, middle_px.v + t * line_px.v};
     }
   };
+  /// A straight smear, cut into pieces that a window holds.
+  [[nodiscard]] static Stroke straight(PixelPoint line_px, PixelPoint middle_px,
+                                       double share) noexcept;
 
   /// What there is on a grid, by size: the light itself, less what is hidden, may be negative.
   struct Survey {
@@ -95,6 +104,7 @@ class Optics {
     }
   };
 
+  OpticsReport spread(const Radiance& in, IrradianceImage& out) noexcept;
   void tabulate() noexcept;
   void focus(double defocus_m) noexcept;
   void fill_background(const Radiance& in, IrradianceImage& out) noexcept;
@@ -109,12 +119,13 @@ class Optics {
   /// A spider's spikes are none of FarWings'.
   [[nodiscard]] bool wings_apart() const noexcept { return spec_.lens.spider_vanes == 0; }
   void spread_grid(const RadianceImage& light, const PixelRect& region, const Survey& found,
-                   int blur_px, const Smear& smear, OpticsReport& report,
+                   int blur_px, const Stroke& stroke, OpticsReport& report,
                    IrradianceImage& out) noexcept;
-  void add_core(const PixelRect& grid_px, PixelPoint move_px, int pieces,
+  void add_core(const PixelRect& grid_px, PixelPoint move_px, double share,
                 IrradianceImage& out) noexcept;
 
   OpticsSpec spec_;
+  int oversampling_;
   OtfCascade cascade_;
   OtfCascade::Focused focused_;
   double defocus_m_ = 0;  ///< of the target
@@ -123,6 +134,7 @@ class Optics {
   double throughput_sr_;
   double faint_w_m2_;
   WorkerPool& pool_;
+  FieldShading shading_;
   FarWings wings_;
   Blur core_;
   GridOtf core_otf_;

@@ -20,6 +20,44 @@ void read_focus(const ConfigTable& table, OpticsSpec& spec) {
     spec.focus_range_m = table.number("focus_km", positive()) * 1e3;
 }
 
+void read_vignetting(const ConfigTable& table, VignettingSpec& spec) {
+  constexpr int kSteps = 100;
+  spec.cos4 = table.choice_or<bool>("vignetting", "none", {{"none", false}, {"cos4", true}});
+  spec.r2 = table.number_or("vignetting_r2", 0.0, any_number());
+  spec.r4 = table.number_or("vignetting_r4", 0.0, any_number());
+  spec.r6 = table.number_or("vignetting_r6", 0.0, any_number());
+  for (int i = 0; i <= kSteps; ++i) {
+    const double s = static_cast<double>(i) / kSteps;
+    const double share = spec.polynomial(s * s);
+    if (share > 0.0 && share <= 2.0) continue;
+    table.fail("vignetting_r2",
+               "and the other terms must leave more than 0 and at most 2 of the "
+               "light, not " +
+                   std::to_string(share) + " at " + std::to_string(s) +
+                   " of the way to the sensor's corners");
+  }
+}
+
+/// As many cells to a pixel's side as carry what the lens passes, three at least.
+void choose_grid(const ConfigTable& table, OpticsSpec& spec) {
+  constexpr int kLeast = 3;
+  constexpr int kMost = 8;
+  if (table.choice_or<bool>("grid", "fine", {{"fine", false}, {"paper-grid", true}})) {
+    spec.oversampling = 1;
+    return;
+  }
+  const CameraGeometry& camera = spec.camera;
+  const double cutoff_per_m = spec.lens.aperture_m / (camera.focal_length_m * spec.lens.band_low_m);
+  const double cells = std::ceil(2.0 * cutoff_per_m * camera.pixel_pitch_m);
+  if (cells > kMost) {
+    table.fail("aperture_m", "passes " + std::to_string(cutoff_per_m * 1e-3) +
+                                 " lp/mm, more than the " +
+                                 std::to_string(0.5e-3 * kMost / camera.pixel_pitch_m) +
+                                 " that eight cells to a pixel can carry");
+  }
+  spec.oversampling = std::max(kLeast, static_cast<int>(cells));
+}
+
 }  // namespace
 
 double MtfTable::at(double frequency_per_m) const noexcept {
@@ -67,16 +105,13 @@ OpticsSpec read_optics(const ConfigTable& table, const CameraGeometry& camera) {
   spec.vibration.amplitude_rad = angle("vibration_urad");
   spec.vibration.direction_rad =
       table.number_or("vibration_direction_deg", 0.0, any_number()) * kDegree;
+  spec.vibration.frequency_hz = table.number_or("vibration_hz", 0.0, between(0.0, 1e6));
   if (table.has("mtf_file")) spec.mtf = read_mtf_table(table.text("mtf_file"));
   spec.largest_wing_px =
       static_cast<int>(table.integer_or("largest_wing_px", 256, between(kSmallestWing_px, 512)));
-  const double cells_per_m = 3.0 / camera.pixel_pitch_m;
-  const double cutoff_per_m = spec.lens.aperture_m / (camera.focal_length_m * spec.lens.band_low_m);
-  if (cutoff_per_m > 0.5 * cells_per_m) {
-    table.fail("aperture_m", "passes " + std::to_string(cutoff_per_m * 1e-3) +
-                                 " lp/mm, more than the " + std::to_string(0.5e-3 * cells_per_m) +
-                                 " that three cells to a pixel can carry");
-  }
+  read_vignetting(table, spec.vignetting);
+  spec.veiling_glare = table.number_or("veiling_glare", 0.0, between(0.0, 0.5));
+  choose_grid(table, spec);
   return spec;
 }
 

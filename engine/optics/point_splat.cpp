@@ -164,8 +164,8 @@ double PointSplat::reach_px(double irradiance_w_m2) const noexcept {
                     largest_reach_px_);
 }
 
-PointSplat::Report PointSplat::add(std::span<const PointSource> points, IrradianceImage& out,
-                                   double least_reach_px) noexcept {
+PointSplat::Report PointSplat::add(std::span<const PointSource> points, const ImagePath& path,
+                                   IrradianceImage& out, double least_reach_px) noexcept {
   ENSURE(out.width() == width_px_ && out.height() == height_px_);
   Report report;
   if (points.empty()) return report;
@@ -177,7 +177,13 @@ PointSplat::Report PointSplat::add(std::span<const PointSource> points, Irradian
     const Band band{b * kBandRows, std::min((b + 1) * kBandRows, height_px_)};
     std::uint64_t& count = footprints_[static_cast<std::size_t>(b)];
     count = 0;
-    for (const PointSource& point : points) streak(point, reach(point), band, out, count);
+    for (const PointSource& point : points) {
+      if (path.bends) {
+        follow(point, path, reach(point), band, out, count);
+      } else {
+        streak(point, reach(point), band, out, count);
+      }
+    }
   });
   for (const std::uint64_t count : footprints_) report.footprints += count;
   double light = 0;
@@ -189,6 +195,19 @@ PointSplat::Report PointSplat::add(std::span<const PointSource> points, Irradian
   }
   report.lost_flux_share = light > 0.0 ? lost / light : 0.0;
   return report;
+}
+
+void PointSplat::follow(const PointSource& point, const ImagePath& path, double followed_px,
+                        const Band& band, IrradianceImage& out,
+                        std::uint64_t& footprints) const noexcept {
+  const ImageMotion motion{point.motion_px, path};
+  for (int i = 0; i < ImagePath::kSteps; ++i) {
+    const PixelPoint middle = motion.middle_of(i);
+    streak({{point.place.u + middle.u, point.place.v + middle.v},
+            point.irradiance_w_m2 / ImagePath::kSteps,
+            motion.step_px(i)},
+           followed_px, band, out, footprints);
+  }
 }
 
 void PointSplat::streak(const PointSource& point, double followed_px, const Band& band,

@@ -8,6 +8,7 @@
 #include "engine/optics/far_wings.h"
 #include "engine/optics/optics_spec.h"
 #include "engine/optics/otf_cascade.h"
+#include "engine/scene/image_motion.h"
 #include "engine/scene/point_source.h"
 
 namespace engine {
@@ -48,9 +49,10 @@ class PointSplat {
     std::uint64_t footprints = 0;  ///< images that were added up
     double lost_flux_share = 0;    ///< of the points' light, beyond where it was followed
   };
-  /// Adds to `out`, of the camera's size. `least_reach_px`: how far to follow each point's light at
-  /// least, of points that are parts of one.
-  Report add(std::span<const PointSource> points, IrradianceImage& out,
+  /// Adds to `out`, of the camera's size. `path`: how far off their own even motions all points
+  /// are. `least_reach_px`: how far to follow each point's light at least, of points that are parts
+  /// of one.
+  Report add(std::span<const PointSource> points, const ImagePath& path, IrradianceImage& out,
              double least_reach_px = kLeastReach_px) noexcept;
 
   /// Of a point's light, in the pixel on whose centre it falls.
@@ -78,6 +80,8 @@ class PointSplat {
   [[nodiscard]] double measure(double defocus_m) const noexcept;
   void streak(const PointSource& point, double followed_px, const Band& band, IrradianceImage& out,
               std::uint64_t& footprints) const noexcept;
+  void follow(const PointSource& point, const ImagePath& path, double followed_px, const Band& band,
+              IrradianceImage& out, std::uint64_t& footprints) const noexcept;
   void stamp(const Footprint& print, const Band& band, IrradianceImage& out) const noexcept;
   void add_core(const Footprint& print, const Level& level, double weight, const Band& band,
                 IrradianceImage& out) const noexcept;

@@ -116,12 +116,14 @@ bool FarTarget::far_enough(const Snapshot& snapshot) noexcept {
 
 PixelRect FarTarget::region_of(const Snapshot& snapshot) const noexcept {
   const Vector3d centre = snapshot.body_from_camera.matrix.transpose() * -snapshot.camera.m;
-  const std::optional<PixelPoint> place = spec_.camera.project(centre);
+  const LocalCamera camera(spec_.camera, snapshot.image_map);
+  const std::optional<PixelPoint> place = camera.project(centre);
   if (!place) return {};
   // Off the axis an image is longer by the secant of the angle, twice.
   const double stretch = centre.squaredNorm() / (centre.z() * centre.z());
   const double half_px =
-      radius_m_ * stretch * spec_.camera.pixels_per_radian() / centre.norm() + 1.0;
+      radius_m_ * stretch * camera.stretch() * spec_.camera.pixels_per_radian() / centre.norm() +
+      1.0;
   const PixelRect limits = spec_.camera.frame().grown_by(spec_.grid.beyond_frame_px);
   const auto inside = [](double x, int low, int high) {
     return static_cast<int>(std::clamp(x, 1.0 * low, 1.0 * high));
@@ -137,12 +139,15 @@ FarTarget::View FarTarget::view_of(const Snapshot& snapshot) const noexcept {
   const Eigen::Matrix3d camera_from_body = snapshot.body_from_camera.matrix.transpose();
   const Vector3d centre = camera_from_body * -snapshot.camera.m;
   const double per_z = spec_.camera.pixels_per_radian() / centre.z();
+  const LocalCamera camera(spec_.camera, snapshot.image_map);
+  const Eigen::Matrix2d& slope = camera.map().slope;
   const auto per_m = [&](const Vector3d& axis) {
     const Vector3d a = camera_from_body * axis;
-    return PixelPoint{per_z * (a.x() - a.z() * centre.x() / centre.z()),
-                      per_z * (a.y() - a.z() * centre.y() / centre.z())};
+    const Eigen::Vector2d straight(per_z * (a.x() - a.z() * centre.x() / centre.z()),
+                                   per_z * (a.y() - a.z() * centre.y() / centre.z()));
+    return PixelPoint{slope.row(0).dot(straight), slope.row(1).dot(straight)};
   };
-  return {spec_.camera.project(centre).value_or(PixelPoint{}), per_m(light_.x_axis()),
+  return {camera.project(centre).value_or(PixelPoint{}), per_m(light_.x_axis()),
           per_m(light_.y_axis())};
 }
 

@@ -114,11 +114,11 @@ void Footprint::mark(const PixelRect& box) noexcept {
 PixelRect Footprint::add(const Mesh& mesh, const BodyView& view) noexcept {
   const PixelRect others = std::exchange(region_, PixelRect{});
   const Eigen::Matrix3d camera_from_body = view.body_from_camera.matrix.transpose();
+  const LocalCamera camera(camera_, view.image_map);
   for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
     const Eigen::Vector3d in_camera =
         camera_from_body * (mesh.vertices[i].cast<double>() - view.camera.m);
-    const PixelPoint p =
-        camera_.project(in_camera).value_or(PixelPoint{-kOutside_px, -kOutside_px});
+    const PixelPoint p = camera.project(in_camera).value_or(PixelPoint{-kOutside_px, -kOutside_px});
     corners_[i] = {std::clamp(p.u, -kOutside_px, kOutside_px),
                    std::clamp(p.v, -kOutside_px, kOutside_px)};
   }

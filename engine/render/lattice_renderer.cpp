@@ -23,7 +23,7 @@ constexpr int kMostSettledRounds = 10;
 constexpr float kPatchError = 0.2F;
 constexpr float kAllAlike = std::numeric_limits<float>::infinity();
 
-std::size_t at(int i) noexcept { return static_cast<std::size_t>(i); }
+constexpr std::size_t at(int i) noexcept { return static_cast<std::size_t>(i); }
 
 }  // namespace
 
@@ -40,8 +40,8 @@ LatticeRenderer::LatticeRenderer(const RenderSpec& spec, std::shared_ptr<TracedT
       pool_(pool) {
   const PixelRect all = spec.camera.frame().grown_by(spec.grid.beyond_frame_px);
   row_counts_.resize(at(all.height()));
-  const int s = spec.grid.oversampling;
-  ENSURE(at(s * s) <= kMostCells);
+  static_assert(kMostCells == at(RenderSpec::kMostOfLattice * RenderSpec::kMostOfLattice));
+  ENSURE(spec.grid.oversampling <= RenderSpec::kMostOfLattice);
   const std::size_t points = LatticeView::most_points(spec);
   for (int i = 0; i < pool.threads(); ++i) {
     benches_.push_back(std::make_unique<Bench>(view_, *target_, points));

@@ -64,10 +64,11 @@ bool LatticeView::place(const Snapshot& snapshot, int side, int most) noexcept {
   if (!(range_m > kNearest * target_->bounding_radius_m)) return false;
   const Matrix3d& axes = snapshot.body_from_camera.matrix;
   const Matrix3d camera_from_body = axes.transpose();
+  const LocalCamera camera(camera_, snapshot.image_map);
   for (std::size_t i = 0; i < corners_.size(); ++i) {
     const Vector3d p =
         camera_from_body * (target_->mesh.vertices[i].cast<double>() - snapshot.camera.m);
-    const auto at = camera_.project(p);
+    const auto at = camera.project(p);
     if (!at) return false;
     // 1/z is linear on the detector; from the target's centre and in its radii it keeps its digits.
     corners_[i] = {(at->u + 0.5 - region.left) * points_a_pixel_,
@@ -77,15 +78,16 @@ bool LatticeView::place(const Snapshot& snapshot, int side, int most) noexcept {
   if (!raster_.place(target_->mesh, corners_, region.width() * points_a_pixel_,
                      region.height() * points_a_pixel_, points_a_pixel_))
     return false;
-  const double step_rad = camera_.ifov_rad() / points_a_pixel_;
-  const Vector3d at_zero = axes * camera_.direction_at({region.left - 0.5, region.top - 0.5});
+  const Vector3d at_zero = axes * camera.direction_at({region.left - 0.5, region.top - 0.5});
+  const Vector3d per_x = axes * camera.direction_per_u() / points_a_pixel_;
+  const Vector3d per_y = axes * camera.direction_per_v() / points_a_pixel_;
   const double advance = range_m - 1.2 * target_->bounding_radius_m;
   start_ = (snapshot.camera.m + advance * at_zero).cast<float>();
-  start_per_x_ = (advance * step_rad * axes.col(0)).cast<float>();
-  start_per_y_ = (advance * step_rad * axes.col(1)).cast<float>();
+  start_per_x_ = (advance * per_x).cast<float>();
+  start_per_y_ = (advance * per_y).cast<float>();
   direction_ = at_zero.cast<float>();
-  direction_per_x_ = (step_rad * axes.col(0)).cast<float>();
-  direction_per_y_ = (step_rad * axes.col(1)).cast<float>();
+  direction_per_x_ = per_x.cast<float>();
+  direction_per_y_ = per_y.cast<float>();
   return true;
 }
 

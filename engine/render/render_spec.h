@@ -67,6 +67,7 @@ struct RenderSpec {
   SunDisc sun_disc = SunDisc::kAuto;
   FarTargetForm far_target = FarTargetForm::kAuto;
   MeshLevelChoice mesh_level = MeshLevelChoice::kFull;
+  static constexpr int kMostOfLattice = 4;  ///< cells on a pixel's side that the lattice can do
   CameraGeometry camera;
   GridWish grid;
   SensorNoise noise;

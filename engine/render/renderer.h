@@ -37,6 +37,7 @@ struct Radiance {
   /// Behind it all, and none of the renderer's business: the imaging chain draws it.
   EarthBackground earth;
   PixelPoint motion_px;  ///< how the image moves from shutter open to shutter close
+  ImagePath path;        ///< how far off that it is between: the imaging chain's, too
   double range_m = std::numeric_limits<double>::infinity();  ///< of the target: its focus
 };
 

@@ -21,9 +21,10 @@ TracedFrame::TracedFrame(const BodyView& view, const CameraGeometry& camera,
                          double bounding_radius_m, double sun_radius_rad) noexcept
     : lamps(lamps_with_cap(view, sun_radius_rad)), origin(view.camera.m) {
   const Matrix3d& axes = view.body_from_camera.matrix;
-  at_zero = axes * camera.direction_at({0.0, 0.0});
-  per_u = axes.col(0) * camera.ifov_rad();
-  per_v = axes.col(1) * camera.ifov_rad();
+  const LocalCamera local(camera, view.image_map);
+  at_zero = axes * local.direction_at({0.0, 0.0});
+  per_u = axes * local.direction_per_u();
+  per_v = axes * local.direction_per_v();
   advance = std::max(0.0, view.camera.m.norm() - 1.2 * bounding_radius_m);
 }
 

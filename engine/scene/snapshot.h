@@ -7,15 +7,37 @@
 #include "engine/core/time.h"
 #include "engine/core/vec.h"
 #include "engine/orbit/attitude.h"
+#include "engine/scene/camera_geometry.h"
 #include "engine/scene/earth_background.h"
+#include "engine/scene/image_motion.h"
 
 namespace engine {
 
-/// The camera's attitude over an exposure: what smear and a rolling shutter integrate.
+/// The camera's attitude over an exposure, which smear integrates: at its ends and middle, and
+/// where it is `known_between`, at even steps between these.
 struct AttitudeTrack {
+  static constexpr int kSteps = ImagePath::kSteps;
+  static constexpr int kStepsOfHalf = kSteps / 2;
+
   CameraAttitude open;
   CameraAttitude middle;
   CameraAttitude close;
+  std::array<CameraAttitude, kStepsOfHalf - 1> to_middle{};
+  std::array<CameraAttitude, kStepsOfHalf - 1> to_close{};
+  bool known_between = false;
+
+  /// After so many of kSteps. Pre: known_between.
+  [[nodiscard]] const CameraAttitude& after(int steps) const noexcept {
+    if (steps == 0) return open;
+    if (steps == kSteps) return close;
+    if (steps == kStepsOfHalf) return middle;
+    const bool first_half = steps < kStepsOfHalf;
+    const int i = (first_half ? steps : steps - kStepsOfHalf) - 1;
+    return (first_half ? to_middle : to_close)[static_cast<std::size_t>(i)];
+  }
+  [[nodiscard]] static Duration time_of(int steps, Duration exposure) noexcept {
+    return exposure * steps / kSteps;
+  }
 };
 
 /// What the loop asks for: when, for how long, looking where.
@@ -37,6 +59,7 @@ struct SkyView {
   AttitudeTrack attitude;    ///< aberration not taken out: a star's apparent direction is seen
   Position<J2000> camera;    ///< from the Earth's centre, at mid-exposure
   Velocity<J2000> velocity;  ///< against the solar system's barycentre; 0: light paths are straight
+  double exposure_s = 0;
 };
 
 /// How a body is seen and lit, in its own axes.
@@ -45,6 +68,7 @@ struct BodyView {
   Rotation<BodyFrame, CameraFrame> body_from_camera;  ///< aberration already taken out
   PixelPoint target_px;  ///< the image of its centre; far outside if behind the camera
   PixelPoint smear_px;   ///< how that image moves from shutter open to shutter close
+  AffineMap image_map;   ///< of its image, for LocalCamera: distortion and a rolling shutter
   double range_m = 0;
   double phase_angle_rad = 0;  ///< at the body, between Sun and camera
 
@@ -68,6 +92,9 @@ struct Snapshot : BodyView {
   std::uint64_t seed = 0;
   SimTime shutter_open{};
   Duration exposure{};
+
+  ImagePath path;            ///< of the target
+  ImagePath boresight_path;  ///< of a star near the boresight
 
   double range_rate_m_s = 0;
   double line_of_sight_rate_rad_s = 0;

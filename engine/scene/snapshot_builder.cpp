@@ -1,5 +1,7 @@
 #include "engine/scene/snapshot_builder.h"
 
+#include <cmath>
+
 #include "engine/orbit/earth_rotation.h"
 #include "engine/orbit/visibility.h"
 
@@ -8,6 +10,8 @@ namespace {
 
 // Far outside any detector, and finite: what lies behind the camera has no image.
 constexpr PixelPoint kNowhere{-1e9, -1e9};
+// Nobody sees that a motion is not even when it is so little off: the OTF at Nyquist by 2e-3.
+constexpr double kEven_px = 0.02;
 
 Lamp lamp_of(const Eigen::Vector3d& irradiance_w_m2, const Rotation<BodyFrame, J2000>& axes) {
   const double strength = irradiance_w_m2.norm();
@@ -30,11 +34,48 @@ void SnapshotBuilder::see(const Propagator& body, const SightLine& line, const B
   out.camera = axes * Position<J2000>{line.camera.position.m - line.target.position.m};
   out.body_from_camera = axes * without_aberration(line) * middle.axes.inverse();
   out.range_m = line.range_m;
-  out.target_px = spec_.camera.project((middle.axes * line.apparent).unit).value_or(kNowhere);
   const PixelPoint at_open = image_of(body, shot.shutter_open, shot.attitude.open);
   const PixelPoint at_close =
       image_of(body, shot.shutter_open + shot.exposure, shot.attitude.close);
   out.smear_px = {at_close.u - at_open.u, at_close.v - at_open.v};
+  const Eigen::Vector3d apparent = (middle.axes * line.apparent).unit;
+  const auto map = spec_.camera.map_near(apparent, out.smear_px, seconds(shot.exposure));
+  out.image_map = map.value_or(AffineMap{});
+  out.target_px =
+      map ? LocalCamera(spec_.camera, out.image_map).project(apparent).value_or(kNowhere)
+          : kNowhere;
+}
+
+void SnapshotBuilder::follow(const Shot& shot, Snapshot& out) const noexcept {
+  const AttitudeTrack& track = shot.attitude;
+  if (!track.known_between) return;
+  // Off the line from its first place to its last, by the place at mid-exposure.
+  const auto trace = [](const auto& place_after, ImagePath& path) {
+    constexpr int kSteps = ImagePath::kSteps;
+    const PixelPoint first = place_after(0);
+    const PixelPoint last = place_after(kSteps);
+    const PixelPoint middle = place_after(kSteps / 2);
+    ImageMotion even{{last.u - first.u, last.v - first.v}, {}};
+    for (int i = 0; i <= kSteps; ++i) {
+      const PixelPoint here = place_after(i);
+      const PixelPoint off{here.u - middle.u - even.after(i).u,
+                           here.v - middle.v - even.after(i).v};
+      path.off_px[static_cast<std::size_t>(i)] = off;
+      path.bends = path.bends || std::hypot(off.u, off.v) > kEven_px;
+    }
+  };
+  trace(
+      [&](int step) {
+        return image_of(target_, shot.shutter_open + AttitudeTrack::time_of(step, shot.exposure),
+                        track.after(step));
+      },
+      out.path);
+  const Eigen::Vector3d star = track.middle.axes.matrix.row(2);
+  trace(
+      [&](int step) {
+        return spec_.camera.project(track.after(step).axes.matrix * star).value_or(kNowhere);
+      },
+      out.boresight_path);
 }
 
 EarthshineChoice SnapshotBuilder::light_up(const SightLine& line, const BodyAxes& axes,
@@ -127,10 +168,11 @@ Snapshot SnapshotBuilder::build(const Shot& shot) const noexcept {
   out.shutter_open = shot.shutter_open;
   out.exposure = shot.exposure;
   see(target_, line, axes, shot, out);
+  follow(shot, out);
   out.range_rate_m_s = line.range_rate_m_s;
   out.line_of_sight_rate_rad_s = line.rate_rad_s;
 
-  out.sky = {shot.attitude, line.camera.position, {}};
+  out.sky = {shot.attitude, line.camera.position, {}, seconds(shot.exposure)};
   if (spec_.light_path == LightPath::kApparent)
     out.sky.velocity.m_s =
         line.camera.velocity.m_s + earth_velocity(spec_.epoch + middle.time_since_epoch()).m_s;

@@ -30,8 +30,9 @@ struct SceneSpec {
 /// Shot -> Snapshot: orbits, Sun, attitudes and lamps at the exposure's time.
 /// Where bodies are to each other is taken at one instant, when the light left the target: light
 /// needs 3 us for a kilometre, and what throws a shadow moves .03 m on meanwhile. Each is seen as
-/// it was when its own light left it. Smear is the target's for all that is in the frame. Thread:
-/// any. Loop-safe. The propagators outlive it.
+/// it was when its own light left it. Smear is the target's for all that is in the frame but stars.
+/// Leaves out: of a rolling shutter, how motion changes while the rows are read.
+/// Thread: any. Loop-safe. The propagators outlive it.
 class SnapshotBuilder {
  public:
   /// Pre: at most kMostCompanions.
@@ -50,6 +51,8 @@ class SnapshotBuilder {
   /// Where a body's centre falls for an attitude at a time.
   [[nodiscard]] PixelPoint image_of(const Propagator& body, SimTime t,
                                     const CameraAttitude& attitude) const noexcept;
+  /// How the target's image moves, and a star's.
+  void follow(const Shot& shot, Snapshot& out) const noexcept;
   void see(const Propagator& body, const SightLine& line, const BodyAxes& axes, const Shot& shot,
            BodyView& out) const noexcept;
   EarthshineChoice light_up(const SightLine& line, const BodyAxes& axes, const Position<J2000>& sun,

@@ -5,6 +5,8 @@
 #include <limits>
 #include <numeric>
 
+#include <Eigen/LU>
+
 #include "engine/core/constants.h"
 #include "engine/orbit/sight_line.h"
 
@@ -116,6 +118,14 @@ void StarField::look_at(const Star& star, Frame& frame, StarsFound& found,
     const auto close = camera_.project(track.close.axes.matrix * seen);
     if (!open || !close) return;
     point.motion_px = {close->u - open->u, close->v - open->v};
+  }
+  if (!camera_.straight()) {
+    const Eigen::Vector3d in_camera = track.middle.axes.matrix * seen;
+    const auto map = camera_.map_near(in_camera, point.motion_px, frame.sky.exposure_s);
+    if (!map) return;
+    // What is stretched has the light of more pixels of an even field.
+    point.place = map->apply(*camera_.project_straight(in_camera));
+    point.irradiance_w_m2 *= map->slope.determinant();
   }
   const double reach_px = frame.limits.reach_px(point.irradiance_w_m2);
   if (!meets(camera_, point, reach_px)) return;

@@ -25,9 +25,11 @@ Snapshot looking_up() {
 
 /// One star of the Sun's colour on the boresight.
 struct Scene {
-  explicit Scene(float v, int threads = 1) : pool(threads) {
+  explicit Scene(float v, int threads = 1, const VignettingSpec& vignetting = {}) : pool(threads) {
     OpticsSpec optics;
     optics.camera = test_support::small_camera(kSide_px);
+    optics.vignetting = vignetting;
+    shading = std::make_unique<FieldShading>(optics);
     StarCatalogue catalogue;
     CatalogueStar star;
     star.v_magnitude = v;
@@ -38,10 +40,21 @@ struct Scene {
         StarField(catalogue, optics.camera, StarLight(detector.mean_wavelength_m)), *splat,
         detector);
   }
-  StarReport add(const Radiance& in = {}) {
+  StarReport add(const Radiance& in = {}, const Snapshot& snapshot = looking_up()) {
     image.resize(kSide_px, kSide_px);
     std::ranges::fill(image.pixels(), 0.0F);
-    return starlight->add(looking_up(), in, 0.0, 0.0, image);
+    return starlight->add(snapshot, in, 0.0, 0.0, *shading, image);
+  }
+  /// The centre of the light.
+  [[nodiscard]] PixelPoint centre() const {
+    PixelPoint moment;
+    for (int v = 0; v < kSide_px; ++v) {
+      for (int u = 0; u < kSide_px; ++u) {
+        moment.u += u * static_cast<double>(image.at(u, v)) / sum();
+        moment.v += v * static_cast<double>(image.at(u, v)) / sum();
+      }
+    }
+    return moment;
   }
   [[nodiscard]] double sum() const {
     double total = 0;
@@ -50,6 +63,7 @@ struct Scene {
   }
   WorkerPool pool;
   DetectorSpec detector;
+  std::unique_ptr<FieldShading> shading;
   std::unique_ptr<PointSplat> splat;
   std::unique_ptr<Starlight> starlight;
   IrradianceImage image;
@@ -128,6 +142,32 @@ TEST(Starlight, TheLastPixelOfTheCoverIsTheLastThatHides) {
   EXPECT_DOUBLE_EQ(share_beside_target(in, {{53.51, 60.0}, 1.0, {}}), 0.0);
   EXPECT_DOUBLE_EQ(share_beside_target(in, {{73.49, 60.0}, 1.0, {}}), 0.0);
   EXPECT_DOUBLE_EQ(share_beside_target(in, {{73.51, 60.0}, 1.0, {}}), 1.0);
+}
+
+TEST(Starlight, AStarFollowsTheBoresightsPath) {
+  Scene scene(4.0F);
+  scene.add();
+  const double still = scene.sum();
+  const PixelPoint at_rest = scene.centre();
+  Snapshot snapshot = looking_up();
+  ImagePath& path = snapshot.boresight_path;
+  path.bends = true;
+  // Away and back: a triangle of 6 px, whose mean is half of that.
+  for (int i = 0; i <= ImagePath::kSteps; ++i)
+    path.off_px[static_cast<std::size_t>(i)] = {6.0 * std::abs(i - 8) / 8.0, 0.0};
+  scene.add({}, snapshot);
+  EXPECT_NEAR(scene.sum() / still, 1.0, 1e-3);
+  EXPECT_NEAR(scene.centre().u - at_rest.u, 3.0, 0.02);
+  EXPECT_NEAR(scene.centre().v - at_rest.v, 0.0, 0.02);
+}
+
+TEST(Starlight, AStarIsVignetted) {
+  Scene plain(4.0F);
+  Scene shaded(4.0F, 1, {.r2 = -0.5});
+  const Snapshot snapshot = looking_up();
+  plain.add({}, snapshot);
+  shaded.add({}, snapshot);
+  EXPECT_NEAR(shaded.sum() / plain.sum(), shaded.shading->at(plain.centre()), 1e-3);
 }
 
 }  // namespace

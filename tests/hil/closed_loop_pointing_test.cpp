@@ -163,4 +163,34 @@ TEST_F(ClosedLoopPointingTest, ATrimReplacesTheOneBefore) {
   EXPECT_NEAR(pointing.trim_rad()[1], 0.0, kRounding_rad);
 }
 
+TEST_F(ClosedLoopPointingTest, WhatItPassesOnTheWayIsNoneOfTheGyrosBusiness) {
+  // A quick vibration: between two neighbouring instants of an exposure it turns faster than over
+  // half of one.
+  hil::JitterSpec vibration;
+  vibration.lines = {{40.0, 20e-6, 0.3, 0.1}};
+  const auto make = [&] {
+    return ClosedLoopPointing(prediction(), hil::PointingSpec{},
+                              hil::Jitter(vibration, 1, SimTime{}));
+  };
+  ClosedLoopPointing plain = make();
+  ClosedLoopPointing passing = make();
+  for (int frame = 0; frame < 5; ++frame) {
+    const SimTime open = sim_time(0.05 * frame);
+    const engine::Duration exposure = std::chrono::milliseconds(10);
+    hil::MeasuredAttitude at_middle;
+    const engine::AttitudeTrack track =
+        hil::track_over(passing, open, exposure, [&] { at_middle = passing.measured(); });
+    EXPECT_EQ(plain.attitude(open).axes.matrix, track.open.axes.matrix);
+    EXPECT_EQ(plain.attitude(open + exposure / 2).axes.matrix, track.middle.axes.matrix);
+    EXPECT_EQ(plain.measured().rate_rad_s, at_middle.rate_rad_s);
+    EXPECT_EQ(plain.attitude(open + exposure).axes.matrix, track.close.axes.matrix);
+    // A sine of 40 Hz, 20 urad, half-way to the middle.
+    const double t_s = 0.05 * frame + 0.0025;
+    const Eigen::Vector3d straight = prediction().attitude(sim_time(t_s)).axes.matrix.row(2);
+    const Eigen::Vector3d there = track.after(4).axes.matrix * straight;
+    EXPECT_NEAR(std::hypot(there.x(), there.y()),
+                std::abs(20e-6 * std::sin(2.0 * engine::kPi * 40.0 * t_s + 0.1)), 1e-11);
+  }
+}
+
 }  // namespace

@@ -42,8 +42,10 @@ TEST(FrameLoop, InLockstepTheAnswerToAFrameShowsInTheNext) {
 
   // Frame k shows the trim that answered frame k - 1, during its whole exposure.
   for (const engine::Shot& shot : generator.shots()) {
-    for (const auto* a : {&shot.attitude.open, &shot.attitude.middle, &shot.attitude.close})
-      EXPECT_EQ(a->axes.matrix(0, 0), static_cast<double>(shot.sequence)) << shot.sequence;
+    ASSERT_TRUE(shot.attitude.known_between);
+    for (int step = 0; step <= engine::AttitudeTrack::kSteps; ++step)
+      EXPECT_EQ(shot.attitude.after(step).axes.matrix(0, 0), static_cast<double>(shot.sequence))
+          << shot.sequence;
   }
   // Up to the slot the old trim holds; then the new one; then the exposure.
   std::vector<IdealPointing::Event> expected;

@@ -39,9 +39,12 @@ class IdealPointing final : public hil::PointingSource {
   }
 
   [[nodiscard]] engine::CameraAttitude attitude(engine::SimTime t) noexcept override {
+    events_.push_back({What::kAttitude, t, 0});
+    return passing(t);
+  }
+  [[nodiscard]] engine::CameraAttitude passing(engine::SimTime t) noexcept override {
     if (t < last_) ++steps_back_;
     last_ = t;
-    events_.push_back({What::kAttitude, t, 0});
     engine::CameraAttitude attitude;
     attitude.axes.matrix(0, 0) = offset_rad_ + trim_[0];
     return attitude;

@@ -300,7 +300,7 @@ void bench_star_footprints(benchmark::State& state) {
             {static_cast<double>(state.range(0)), 0.0}};
   IrradianceImage image(camera.width_px, camera.height_px);
   std::uint64_t footprints = 0;
-  for (auto _ : state) footprints += splat.add(stars, image).footprints;
+  for (auto _ : state) footprints += splat.add(stars, {}, image).footprints;
   state.counters["footprints_s"] =
       benchmark::Counter(static_cast<double>(footprints), benchmark::Counter::kIsRate);
   state.counters["reach_px"] = splat.reach_px(stars[0].irradiance_w_m2);

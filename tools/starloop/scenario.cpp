@@ -82,9 +82,10 @@ Duration read_deadline(const ConfigTable& table, const RunSpec& run, engine::Ren
   return deadline;
 }
 
-// What the lattice does not know: other bodies, and stopping half-way.
+// What the lattice does not know: other bodies, fine grids, and stopping half-way.
 bool wants_paths(const ConfigTable& render, const Scenario& s) {
-  return !s.companions.empty() || (render.has("deadline_ms") && !render.is_text("deadline_ms"));
+  return !s.companions.empty() || s.optics.oversampling > engine::RenderSpec::kMostOfLattice ||
+         (render.has("deadline_ms") && !render.is_text("deadline_ms"));
 }
 
 void read_record(const ConfigTable& table, RunSpec& run) {
@@ -184,6 +185,19 @@ engine::EarthshineSensor earthshine_sensor(const engine::SensorNoise& noise,
   return sensor;
 }
 
+/// One of few periods to an exposure is a line of the jitter, whose path each exposure integrates.
+void take_slow_vibration(Scenario& s) {
+  engine::VibrationSpec& vibration = s.optics.vibration;
+  const double periods = vibration.frequency_hz * engine::seconds(s.run.exposure);
+  if (vibration.amplitude_rad == 0.0 || vibration.frequency_hz == 0.0 ||
+      periods >= engine::VibrationSpec::kFewPeriods)
+    return;
+  s.slow_vibration = {
+      {{vibration.frequency_hz, vibration.amplitude_rad, vibration.direction_rad, 0.0}}, {}, {}};
+  s.jitter.lines.push_back(s.slow_vibration.lines.front());
+  vibration = {};
+}
+
 int worker_threads(int wanted) {
   if (wanted > 0) return wanted;
   return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
@@ -237,8 +251,14 @@ Scenario read_scenario(const ConfigReader& config) {
   s.render.camera = s.scene.camera;
   if (!s.companions.empty() && s.render.method != engine::RenderMethod::kPaths)
     config.table("render").fail("method", "must be \"paths\" where there are companions");
+  if (s.optics.oversampling > engine::RenderSpec::kMostOfLattice &&
+      s.render.method != engine::RenderMethod::kPaths)
+    config.table("render").fail("method", "must be \"paths\" where the optics want " +
+                                              std::to_string(s.optics.oversampling) +
+                                              " cells to a pixel's side");
   s.detector = engine::read_detector(config.table("detector"), s.scene.camera.pixel_pitch_m,
                                      s.scene.sun.mean_wavelength_m);
+  s.detector.binning = s.scene.camera.window.binning;
   s.guidance = hil::read_guidance_error(config.table("guidance"));
   s.mode = hil::read_guidance_mode(config.table("guidance"));
   s.target_knowledge = hil::read_target_knowledge(config.table("guidance"));
@@ -258,11 +278,22 @@ Scenario read_scenario(const ConfigReader& config) {
   s.port = hil::read_command_port(config.table("command_port"));
   s.faults = hil::read_faults(config, s.scene.seed, s.scene.camera.width_px, s.detector.bits);
   s.jitter = hil::read_jitter(config);
+  take_slow_vibration(s);
   s.sensors = hil::read_sensors(config.table("sensors"));
   s.tracker = read_tracker(config.table("tracker"), s.scene.camera);
   s.tracker.black_dn = s.detector.pedestal_dn;
   config.reject_unknown_keys();
   return s;
+}
+
+engine::SensorMaps sensor_maps(const Scenario& scenario) {
+  const engine::CameraGeometry& camera = scenario.scene.camera;
+  const engine::SensorWindow& window = camera.window;
+  const engine::SensorMaps sensor(scenario.detector, window.sensor_width_px * window.binning,
+                                  window.sensor_height_px * window.binning);
+  return sensor.binned(window.binning)
+      .cut({window.left_px, window.top_px, window.left_px + camera.width_px,
+            window.top_px + camera.height_px});
 }
 
 std::vector<std::string> companion_names(const Scenario& scenario) {
@@ -291,6 +322,7 @@ Rig::Rig(const Scenario& scenario, int threads)
       path_(scenario.scene.light_path),
       roll_(scenario.roll),
       boresight_(scenario.boresight),
+      slow_vibration_(scenario.slow_vibration, scenario.scene.seed, engine::SimTime{}),
       camera_(scenario.camera_orbit, epoch_),
       target_(scenario.target_orbit, epoch_),
       believed_target_(target_, scenario.target_knowledge),
@@ -329,11 +361,8 @@ Rig::Rig(const Scenario& scenario, int threads)
   generator_ = std::make_unique<engine::ImagingChain>(
       engine::SnapshotBuilder(scene, camera_, target_, move_companions(scenario)),
       engine::make_renderer(render, bodies.front(), pool_, {bodies.begin() + 1, bodies.end()}),
-      std::move(optics),
-      engine::Detector(detector, pool_,
-                       engine::SensorMaps(detector, scenario.scene.camera.width_px,
-                                          scenario.scene.camera.height_px)),
-      detector, scenario.scene.camera, &hil::SteadyClock::stopwatch, std::move(stars));
+      std::move(optics), engine::Detector(detector, pool_, sensor_maps(scenario)), detector,
+      scenario.scene.camera, &hil::SteadyClock::stopwatch, std::move(stars));
 }
 
 std::vector<engine::Companion> Rig::move_companions(const Scenario& scenario) {
@@ -352,12 +381,11 @@ std::vector<engine::Companion> Rig::move_companions(const Scenario& scenario) {
 }
 
 engine::Shot Rig::predicted_shot(engine::SimTime open, engine::Duration exposure) const {
-  hil::ScriptedPointing pointing = prediction();
+  hil::ClosedLoopPointing pointing(prediction(), hil::PointingSpec{}, slow_vibration_);
   engine::Shot shot;
   shot.shutter_open = open;
   shot.exposure = exposure;
-  shot.attitude = {pointing.attitude(open), pointing.attitude(open + exposure / 2),
-                   pointing.attitude(open + exposure)};
+  shot.attitude = hil::track_over(pointing, open, exposure, [] {});
   return shot;
 }
 

@@ -87,6 +87,7 @@ struct Scenario {
   std::optional<hil::CommandPortSpec> port;
   hil::FaultSpec faults;
   hil::JitterSpec jitter;
+  hil::JitterSpec slow_vibration;  ///< of the optics, of few periods to an exposure: in jitter, too
   hil::SensorSpec sensors;
   tracker::TrackerSpec tracker;
 };
@@ -116,6 +117,9 @@ struct ScenarioSource {
 /// In the order that frames have them in.
 [[nodiscard]] std::vector<std::string> companion_names(const Scenario& scenario);
 
+/// Of what the camera reads out. Throws engine::ConfigError.
+[[nodiscard]] engine::SensorMaps sensor_maps(const Scenario& scenario);
+
 /// Everything that is built from a scenario once, before the first shutter opens.
 class Rig {
  public:
@@ -124,7 +128,7 @@ class Rig {
   [[nodiscard]] engine::SceneGenerator& generator() noexcept { return *generator_; }
   /// Without an error.
   [[nodiscard]] hil::ScriptedPointing prediction() const;
-  /// Whose shutter opens then, the camera following that.
+  /// Whose shutter opens then, the camera following that; of vibration with the optics' slow one.
   [[nodiscard]] engine::Shot predicted_shot(engine::SimTime open, engine::Duration exposure) const;
   /// As far as the target's orbit is known.
   [[nodiscard]] hil::ScriptedPointing believed() const;
@@ -143,6 +147,7 @@ class Rig {
   engine::LightPath path_;
   hil::RollRule roll_;
   std::optional<engine::CameraAttitude> boresight_;
+  hil::Jitter slow_vibration_;
   engine::KeplerPropagator camera_;
   engine::KeplerPropagator target_;
   std::vector<std::unique_ptr<engine::Propagator>> companions_;

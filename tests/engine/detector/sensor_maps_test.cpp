@@ -215,5 +215,34 @@ TEST(SensorMaps, SayWhichKeyNamesABadFile) {
   }
 }
 
+TEST(SensorMaps, BinnedPixelsAreTheirPhotosites) {
+  const DetectorSpec spec = uneven();
+  const SensorMaps fine = maps_of(spec);
+  const SensorMaps coarse = fine.binned(2);
+  ASSERT_EQ(coarse.response().size(), fine.response().size() / 4);
+  for (const int place : {0, 255, 1000, 65535}) {
+    const int u = 2 * (place % 256);
+    const int v = 2 * (place / 256);
+    double response = 0;
+    double dark_e_s = 0;
+    for (const int site : {0, 1, kSide_px, kSide_px + 1}) {
+      const auto at = static_cast<std::size_t>(v * kSide_px + u + site);
+      response += static_cast<double>(fine.response()[at]) / 4.0;
+      dark_e_s += static_cast<double>(fine.dark_e_s()[at]);
+    }
+    const auto at = static_cast<std::size_t>(place);
+    EXPECT_NEAR(static_cast<double>(coarse.response()[at]), response, 1e-6);
+    EXPECT_NEAR(static_cast<double>(coarse.dark_e_s()[at]), dark_e_s, 1e-4 * dark_e_s + 1e-6);
+  }
+  EXPECT_TRUE(equal(fine.binned(1).dark_e_s(), fine.dark_e_s()));
+  EXPECT_TRUE(SensorMaps().binned(2).response().empty());
+  // Four times the dark current, without maps, too.
+  DetectorSpec binned;
+  binned.background_e_s = 7;
+  const double one_e = binned.dark_mean_e(std::chrono::milliseconds(50));
+  binned.binning = 2;
+  EXPECT_DOUBLE_EQ(binned.dark_mean_e(std::chrono::milliseconds(50)), 4.0 * one_e);
+}
+
 }  // namespace
 }  // namespace engine

@@ -31,7 +31,7 @@ std::vector<float> blurred(const RadianceImage& picture, int left, int top, Pixe
   WorkerPool pool(threads);
   const std::vector<float> table = gaussian_table();
   GridOtf otf(1.0 / kStep, 1, kStep * kSamples);
-  otf.prepare(RadialOtf{table, 4096.0 / 1.4}, kStep * kSamples, smear);
+  otf.prepare(RadialOtf{table, 4096.0 / 1.4}, kStep * kSamples, {smear, {}});
   Blur blur(kSamples, kStep, pool);
   blur.transform(picture, {kStep * kSamples, kStep * kSamples, left, top}, otf);
   blur.sample(move_x, move_y);

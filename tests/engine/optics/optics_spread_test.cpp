@@ -284,5 +284,140 @@ TEST(OpticsSpread, SpiderAndErrorsMakeNoNegativeLight) {
   EXPECT_GT(out.sum(), 0.0);
 }
 
+/// Around a corner: to the right until mid-exposure, then down.
+ImagePath corner_of(double length_px) {
+  ImagePath path;
+  path.bends = true;
+  ImageMotion even{{length_px, length_px}, {}};
+  for (int i = 0; i <= ImagePath::kSteps; ++i) {
+    const double t = static_cast<double>(i) / ImagePath::kSteps;
+    const PixelPoint here{std::min(2.0 * t - 1.0, 0.0) * length_px,
+                          std::max(2.0 * t - 1.0, 0.0) * length_px};
+    path.off_px[static_cast<std::size_t>(i)] = {here.u - even.after(i).u, here.v - even.after(i).v};
+  }
+  return path;
+}
+
+TEST(OpticsSpread, AnImageThatTurnsACornerIsTwoStraightSmears) {
+  const OpticsSpec spec = spec_of();
+  const double faint = 0.05 * throughput_sr(spec) / 15000.0;
+  // Within one window, and beyond what one holds; its grid, its wings and its points.
+  for (const double length_px : {4.0, 24.0, 80.0}) {
+    Radiance in = patched_disc(40, 256);
+    in.points = {{{251.25, 259.5}, 4e-11, {}}};
+    in.motion_px = {length_px, length_px};
+    in.path = corner_of(length_px);
+    const Projected bent = project(in, spec, faint);
+    // Each leg as a straight smear of its own, moved to where its middle is by the turn of waves.
+    in.path = {};
+    const auto leg = [&](PixelPoint from, PixelPoint to) {
+      Radiance part = in;
+      part.motion_px = {to.u - from.u, to.v - from.v};
+      ImagePath& path = part.path;
+      path.bends = false;
+      const PixelPoint middle{0.5 * (from.u + to.u), 0.5 * (from.v + to.v)};
+      EXPECT_EQ(middle.u, std::round(middle.u)) << "whole pixels";
+      part.region = {in.region.left + static_cast<int>(middle.u),
+                     in.region.top + static_cast<int>(middle.v),
+                     in.region.right + static_cast<int>(middle.u),
+                     in.region.bottom + static_cast<int>(middle.v)};
+      part.points.front().place.u += middle.u;
+      part.points.front().place.v += middle.v;
+      return project(part, spec, faint);
+    };
+    const Projected across = leg({-length_px, 0.0}, {});
+    const Projected down = leg({}, {0.0, length_px});
+    double worst = 0;
+    for (int v = 0; v < kSide_px; ++v)
+      for (int u = 0; u < kSide_px; ++u)
+        worst = std::max(worst, std::abs(bent.at(u, v) - 0.5 * (across.at(u, v) + down.at(u, v))));
+    EXPECT_LT(worst, 2e-4 * bent.highest()) << length_px;
+    EXPECT_NEAR(bent.sum() / across.sum(), 1.0, 1e-4) << length_px;
+  }
+}
+
+TEST(OpticsSpread, AWholeSwingHasBesselsFunctionForItsOtf) {
+  // A sine's path is J0 of its amplitude (eq 18), but for what sixteen straight steps cut off.
+  OpticsSpec still = spec_of(256);
+  const double faint = 1e-3 * throughput_sr(still) / 15000.0;
+  constexpr double kAmplitude_px = 2.0;
+  Radiance in = patched_disc(40, 128);
+  in.path.bends = true;
+  for (int i = 0; i <= ImagePath::kSteps; ++i)
+    in.path.off_px[static_cast<std::size_t>(i)] = {
+        kAmplitude_px * std::sin(2.0 * kPi * i / ImagePath::kSteps), 0.0};
+  const Projected swung = project(in, still, faint);
+  OpticsSpec shaken = still;
+  shaken.vibration.amplitude_rad = kAmplitude_px * still.camera.ifov_rad();
+  in.path = {};
+  const Projected blurred = project(in, shaken, faint);
+  const Projected sharp = project(in, still, faint);
+  double off = 0;
+  double blur = 0;
+  for (int v = 100; v < 156; ++v) {
+    for (int u = 100; u < 156; ++u) {
+      off = std::max(off, std::abs(swung.at(u, v) - blurred.at(u, v)));
+      blur = std::max(blur, std::abs(sharp.at(u, v) - blurred.at(u, v)));
+    }
+  }
+  EXPECT_LT(off, 0.02 * blur);
+  EXPECT_GT(blur, 0.1 * sharp.highest());
+}
+
+TEST(OpticsSpread, ThePixelGridOfThePaperIsOffByAnEighth) {
+  // At Nyquist, of a wave: folded frequencies come in, and the MTF beyond half a cycle is lost.
+  OpticsSpec fine = spec_of(256);
+  OpticsSpec paper = fine;
+  paper.oversampling = 1;
+  const double faint = 1e-3 * throughput_sr(fine) / 15000.0;
+  Radiance in;
+  in.region = {96, 96, 160, 160};
+  const auto edge = [&](int oversampling) {
+    in.oversampling = oversampling;
+    in.grid.resize(64 * oversampling, 64 * oversampling);
+    for (int y = 0; y < in.grid.height(); ++y)
+      for (int x = 0; x < in.grid.width(); ++x)
+        in.grid.at(x, y) = x < 32 * oversampling ? 1.0F : 0.0F;
+  };
+  edge(3);
+  const Projected right = project(in, fine, faint);
+  edge(1);
+  const Projected wrong = project(in, paper, faint);
+  double worst = 0;
+  for (int u = 120; u < 136; ++u)
+    worst = std::max(worst, std::abs(right.at(u, 128) - wrong.at(u, 128)) / right.highest());
+  EXPECT_GT(worst, 0.02);
+  EXPECT_LT(worst, 0.2);
+  EXPECT_NEAR(wrong.sum() / right.sum(), 1.0, 2e-3);
+}
+
+TEST(OpticsSpread, APlaceIsKeptWhateverTheCellsToAPixel) {
+  // An even number has no cell in the middle of a pixel.
+  for (const int cells : {1, 2, 3, 4, 6}) {
+    OpticsSpec spec = spec_of(128);
+    spec.oversampling = cells;
+    Radiance in;
+    in.region = {50, 60, 58, 66};
+    in.oversampling = cells;
+    in.grid.resize(8 * cells, 6 * cells);
+    std::ranges::fill(in.grid.pixels(), 1.0F);
+    const Projected out = project(in, spec, 1e-4 * throughput_sr(spec) / 15000.0);
+    double u_sum = 0;
+    double v_sum = 0;
+    for (int v = 0; v < 128; ++v) {
+      for (int u = 0; u < 128; ++u) {
+        u_sum += out.at(u, v) * u;
+        v_sum += out.at(u, v) * v;
+      }
+    }
+    // Of wings that the frame cuts unevenly .05 px: 54 and 73 px on either side.
+    EXPECT_NEAR(u_sum / out.sum(), 53.5, 0.06) << cells;
+    EXPECT_NEAR(v_sum / out.sum(), 62.5, 0.06) << cells;
+    EXPECT_NEAR(out.at(53, 62) / out.at(54, 63), 1.0, 1e-3) << cells;
+    EXPECT_NEAR(out.at(50, 62) / out.at(57, 63), 1.0, 1e-3) << cells;
+    EXPECT_NEAR(out.at(53, 59) / out.at(54, 66), 1.0, 2e-3) << cells;
+  }
+}
+
 }  // namespace
 }  // namespace engine

@@ -530,7 +530,7 @@ TEST(Optics, SecondFrameRemembersNothingOfTheFirst) {
   EXPECT_TRUE(std::ranges::equal(first.pixels(), again.pixels()));
 }
 
-TEST(ReadOptics, RefusesALensThatThreeCellsCannotCarry) {
+TEST(ReadOptics, TakesAsManyCellsAsCarryWhatTheLensPasses) {
   const auto read = [](const std::string& aperture) {
     const ConfigReader config =
         ConfigReader::from_text("[optics]\ntransmission = 0.7\naperture_m = " + aperture, "x.toml");
@@ -538,8 +538,11 @@ TEST(ReadOptics, RefusesALensThatThreeCellsCannotCarry) {
   };
   EXPECT_DOUBLE_EQ(read("0.36").lens.aperture_m, 0.36);
   // Half of 3 cells per 6.5 um is 231 lp/mm; 450 nm reach it at .467 m.
-  EXPECT_NO_THROW(read("0.467"));
-  EXPECT_THROW(read("0.468"), ConfigError);
+  EXPECT_EQ(read("0.02").oversampling, 3);
+  EXPECT_EQ(read("0.467").oversampling, 3);
+  EXPECT_EQ(read("0.468").oversampling, 4);
+  EXPECT_EQ(read("1.24").oversampling, 8);
+  EXPECT_THROW(read("1.25"), ConfigError);
   EXPECT_THROW(read("-1"), ConfigError);
 }
 

@@ -47,7 +47,7 @@ Picture splat(const std::vector<PointSource>& points, const OpticsSpec& spec = s
   PointSplat splat(spec, OtfCascade(spec), faint_w_m2, pool);
   Picture out;
   out.image.resize(spec.camera.width_px, spec.camera.height_px);
-  out.report = splat.add(points, out.image);
+  out.report = splat.add(points, {}, out.image);
   return out;
 }
 
@@ -100,7 +100,7 @@ TEST(PointSplat, ImageAndCentroidAreThoseOfTheTransformAtEveryPhase) {
       const PointSource star{{128.0 + i / 40.0, 127.3 - i / 17.0}, 1.0, {}};
       Picture got;
       got.image.resize(kSide_px, kSide_px);
-      table.add(std::span(&star, 1), got.image);
+      table.add(std::span(&star, 1), {}, got.image);
       const Picture want = exact(star, spread, spec);
       const double error = largest_difference(got, want) / want.highest();
       EXPECT_LT(error, 1e-4) << spec.lens.aperture_m << ", phase " << i;
@@ -200,7 +200,7 @@ TEST(PointSplat, NoPointsChangeNothing) {
   PointSplat splat(spec_of(), OtfCascade(spec_of()), kFollowAll_w_m2, pool);
   IrradianceImage image(kSide_px, kSide_px);
   std::ranges::fill(image.pixels(), 0.25F);
-  EXPECT_EQ(splat.add({}, image).footprints, 0U);
+  EXPECT_EQ(splat.add({}, {}, image).footprints, 0U);
   EXPECT_TRUE(std::ranges::all_of(image.pixels(), [](float x) { return x == 0.25F; }));
 }
 

@@ -457,5 +457,35 @@ TEST(FarTarget, AKeptPictureCostsNoRays) {
   EXPECT_EQ(again.samples, 0U);
 }
 
+TEST(FarTarget, AMappedImageIsMovedAndStretchedWhateverItsForm) {
+  const Mesh telescope = telescope_mesh();
+  struct Case {
+    double range_m;
+    RenderMethod method;
+    FarTargetForm form;
+  };
+  for (const Case& c : {Case{300e3, RenderMethod::kPaths, FarTargetForm::kAuto},
+                        Case{300e3, RenderMethod::kLattice, FarTargetForm::kAuto},
+                        Case{6000e3, RenderMethod::kLattice, FarTargetForm::kAuto},
+                        Case{60000e3, RenderMethod::kPaths, FarTargetForm::kPoint}}) {
+    Rig rig(telescope, white_telescope(),
+            {.method = c.method, .side_px = 128, .samples = 3000, .form = c.form, .settled = true});
+    Snapshot snapshot = from_afar(c.range_m);
+    (void)rig.render(snapshot);
+    const Rig::Seen straight = rig.project();
+    AffineMap& map = snapshot.image_map;
+    map.slope << 1.1, 0.05, -0.02, 0.95;
+    const Eigen::Vector2d middle(64.0, 64.0);
+    map.shift = middle - map.slope * middle + Eigen::Vector2d(3.25, -2.5);
+    (void)rig.render(snapshot);
+    const Rig::Seen mapped = rig.project();
+    const PixelPoint want = map.apply(straight.centre);
+    // Two renderings' noise, and wings that the frame cuts.
+    EXPECT_NEAR(mapped.centre.u, want.u, 0.05) << c.range_m;
+    EXPECT_NEAR(mapped.centre.v, want.v, 0.05) << c.range_m;
+    EXPECT_NEAR(mapped.light_e / straight.light_e, map.slope.determinant(), 4e-3) << c.range_m;
+  }
+}
+
 }  // namespace
 }  // namespace engine

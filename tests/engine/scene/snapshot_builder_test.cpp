@@ -305,5 +305,93 @@ TEST(SnapshotBuilder, PassesTheFallbackOfTheRollOn) {
   EXPECT_TRUE(builder.build(shot).roll_is_fallback);
 }
 
+/// The shot of a camera that swings along its x by a sine, so many whole swings in the exposure.
+Shot swinging_shot(const Flyby& flyby, double amplitude_rad, double swings) {
+  Shot shot = tracked_shot(flyby, kClosestOfPass3_s);
+  AttitudeTrack& track = shot.attitude;
+  track.known_between = true;
+  const auto swing = [&](CameraAttitude& attitude, int step) {
+    const Duration after = AttitudeTrack::time_of(step, shot.exposure);
+    attitude = tracking(flyby, shot.shutter_open + after, LightPath::kApparent);
+    const double turns = swings * (static_cast<double>(step) / AttitudeTrack::kSteps - 0.5);
+    // Towards +x the camera looks, and the image moves to smaller u.
+    const double tilt = amplitude_rad * std::sin(2.0 * kPi * turns);
+    attitude.axes.matrix =
+        Eigen::AngleAxisd(-tilt, Vector3d::UnitY()).toRotationMatrix() * attitude.axes.matrix;
+  };
+  swing(track.open, 0);
+  swing(track.middle, AttitudeTrack::kStepsOfHalf);
+  swing(track.close, AttitudeTrack::kSteps);
+  for (int i = 0; i < AttitudeTrack::kStepsOfHalf - 1; ++i) {
+    swing(track.to_middle[static_cast<std::size_t>(i)], i + 1);
+    swing(track.to_close[static_cast<std::size_t>(i)], AttitudeTrack::kStepsOfHalf + i + 1);
+  }
+  return shot;
+}
+
+TEST(SnapshotBuilder, KnowsThePathOfAnImageThatSwings) {
+  const Flyby flyby;
+  const SnapshotBuilder builder(spec_of(flyby), flyby.camera, flyby.target);
+  const CameraGeometry camera;
+  const double amplitude_px = 4.0;
+  const Snapshot s = builder.build(swinging_shot(flyby, amplitude_px * camera.ifov_rad(), 1.0));
+  ASSERT_TRUE(s.path.bends);
+  ASSERT_TRUE(s.boresight_path.bends);
+  EXPECT_NEAR(s.smear_px.u, 0.0, 1e-6);  // it ends where it began
+  for (int i = 0; i <= ImagePath::kSteps; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    const double turns = static_cast<double>(i) / ImagePath::kSteps - 0.5;
+    const double want_px = -amplitude_px * std::sin(2.0 * kPi * turns);
+    EXPECT_NEAR(s.path.off_px[at].u, want_px, 1e-6) << i;
+    EXPECT_NEAR(s.path.off_px[at].v, 0.0, 1e-6) << i;
+    EXPECT_NEAR(s.boresight_path.off_px[at].u, want_px, 1e-3) << i;
+  }
+}
+
+TEST(SnapshotBuilder, NobodySeesThatAMotionIsEvenButForAFiftiethOfAPixel) {
+  const Flyby flyby;
+  const SnapshotBuilder builder(spec_of(flyby), flyby.camera, flyby.target);
+  const CameraGeometry camera;
+  EXPECT_FALSE(builder.build(swinging_shot(flyby, 0.0, 1.0)).path.bends);
+  EXPECT_FALSE(builder.build(swinging_shot(flyby, 0.019 * camera.ifov_rad(), 1.0)).path.bends);
+  EXPECT_TRUE(builder.build(swinging_shot(flyby, 0.021 * camera.ifov_rad(), 1.0)).path.bends);
+  // A smear that is even is no path.
+  Shot smeared = swinging_shot(flyby, 0.0, 1.0);
+  AttitudeTrack& track = smeared.attitude;
+  for (CameraAttitude* a : {&track.open, &track.close}) *a = track.middle;
+  for (auto* half : {&track.to_middle, &track.to_close})
+    for (CameraAttitude& a : *half) a = track.middle;
+  const Snapshot s = builder.build(smeared);
+  EXPECT_GT(std::hypot(s.smear_px.u, s.smear_px.v), 30.0);
+  EXPECT_FALSE(s.path.bends);
+}
+
+TEST(SnapshotBuilder, ATargetIsSeenWhereDistortionAndARollingShutterPutIt) {
+  const Flyby flyby;
+  SceneSpec spec = spec_of(flyby);
+  spec.camera.distortion.k1 = 5e4;
+  spec.camera.row_time_s = 5e-6;
+  const SnapshotBuilder builder(spec, flyby.camera, flyby.target);
+  Shot shot = tracked_shot(flyby, kClosestOfPass3_s);
+  // 300 px to the right of the target and 400 px below it, held there.
+  const double ifov = spec.camera.ifov_rad();
+  const auto& axes = shot.attitude.middle.axes.matrix;
+  const Vector3d aside = axes.row(2) + 300.0 * ifov * axes.row(0) + 400.0 * ifov * axes.row(1);
+  for (CameraAttitude* a : {&shot.attitude.open, &shot.attitude.middle, &shot.attitude.close})
+    *a = look_along(direction_of<J2000>(aside));
+  const Snapshot s = builder.build(shot);
+  const PixelPoint straight =
+      SnapshotBuilder(spec_of(flyby), flyby.camera, flyby.target).build(shot).target_px;
+  EXPECT_NEAR(straight.v, 112.0, 1.0);
+  const double off_px = std::hypot(straight.u - 512.0, straight.v - 512.0);
+  const double bent = 1.0 + 5e4 * std::pow(off_px * ifov, 2);
+  EXPECT_GT(bent, 1.02);
+  // The rows above the middle are exposed before it is.
+  const double rows = (s.target_px.v - 512.0) * 5e-6 / 1e-3;
+  EXPECT_NEAR(s.target_px.u, 512.0 + (straight.u - 512.0) * bent + rows * s.smear_px.u, 0.01);
+  EXPECT_NEAR(s.target_px.v, 512.0 + (straight.v - 512.0) * bent + rows * s.smear_px.v, 0.01);
+  EXPECT_GT(std::abs(rows), 1.5);
+}
+
 }  // namespace
 }  // namespace engine

@@ -267,5 +267,41 @@ TEST(StarField, WhatIsTooManyIsCountedAndTheFaintestGo) {
   EXPECT_EQ(found.points.capacity(), kRoom);
 }
 
+TEST(StarField, StarsFallWhereDistortionAndARollingShutterPutThem) {
+  CameraGeometry camera = camera_of(0.1);
+  camera.distortion.k1 = 2.0;
+  camera.row_time_s = 10e-6;
+  const Vector3d boresight(1, 0, 0);
+  SkyView sky = looking_at(boresight);
+  sky.exposure_s = 0.02;
+  const auto& axes = sky.attitude.middle.axes.matrix;
+  // Turning about y: stars move along u, by 40 px over the exposure.
+  const auto turned = [&](double rad) {
+    CameraAttitude a = sky.attitude.middle;
+    a.axes.matrix = Eigen::AngleAxisd(rad, Vector3d::UnitY()).toRotationMatrix() * a.axes.matrix;
+    return a;
+  };
+  const double half_rad = 20.0 * camera.ifov_rad();
+  sky.attitude.open = turned(-half_rad);
+  sky.attitude.close = turned(half_rad);
+  const Vector3d unit =
+      (boresight + 0.05 * axes.row(0).transpose() - 0.06 * axes.row(1).transpose()).normalized();
+  const Found found = find({star_at(unit)}, camera, sky);
+  ASSERT_EQ(found.points.size(), 1U);
+  const PointSource& star = found.points.front();
+  const auto bent = camera.project(axes * unit);
+  const double motion = star.motion_px.u;
+  EXPECT_NEAR(std::abs(motion), 40.0, 1.5);
+  const double rows = (star.place.v - 500.0) * camera.row_time_s / sky.exposure_s;
+  EXPECT_NEAR(star.place.u, bent->u + rows * motion, 0.01);
+  EXPECT_NEAR(star.place.v, bent->v + rows * star.motion_px.v, 0.01);
+  // An even field's share: as many more pixels as the image is stretched.
+  const double k = 2.0 * (0.05 * 0.05 + 0.06 * 0.06);
+  const double stretched = (1.0 + k) * (1.0 + 3.0 * k);
+  const Found plain = find({star_at(unit)}, camera_of(0.1), sky);
+  EXPECT_NEAR(star.irradiance_w_m2 / plain.points.front().irradiance_w_m2, stretched,
+              2e-3 * stretched);
+}
+
 }  // namespace
 }  // namespace engine
