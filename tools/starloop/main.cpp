@@ -112,6 +112,14 @@ int run_command(int argc, char** argv) {
       ->check(CLI::Range(0.0, 9e9));
   mtf_app->add_option("--out", mtf.out, "CSV file; the PNG goes beside it")->capture_default_str();
 
+  std::string bench_folder = "characterize";
+  CLI::App* bench_app = app.add_subcommand(
+      "characterize",
+      "Measure the camera: photon transfer as in EMVA 1288 and a slanted edge, beside the truth");
+  add_common(*bench_app, common);
+  bench_app->add_option("--out", bench_folder, "folder that gets report, tables and pictures")
+      ->capture_default_str();
+
   starloop::SoakOptions soak;
   CLI::App* soak_app = app.add_subcommand(
       "soak", "Fly a pass over and over; exit 1 when anything slips, grows or gets lost");
@@ -143,6 +151,7 @@ int run_command(int argc, char** argv) {
   if (soak_app->parsed()) return starloop::soak(common, soak);
   if (replay_app->parsed()) return starloop::replay_log(replay);
   if (mtf_app->parsed()) return starloop::export_mtf(common, mtf);
+  if (bench_app->parsed()) return starloop::characterize_camera(common, bench_folder);
   if (links_app->parsed()) return starloop::list_links();
   if (passes_app->parsed()) return starloop::list_passes(common, json);
   return starloop::render_frames(common, render);

@@ -198,12 +198,19 @@ void take_slow_vibration(Scenario& s) {
   vibration = {};
 }
 
+}  // namespace
+
 int worker_threads(int wanted) {
   if (wanted > 0) return wanted;
   return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
 }
 
-}  // namespace
+double faint_irradiance_w_m2(const Scenario& scenario) {
+  const engine::DetectorSpec& detector = scenario.detector;
+  const double dark_e = detector.dark_mean_e(scenario.run.exposure);
+  return kUnseenShareOfNoise * detector.noise_e(dark_e) /
+         detector.electrons_per_irradiance(scenario.run.exposure);
+}
 
 Scenario read_scenario(const ConfigReader& config) {
   Scenario s;
@@ -332,13 +339,10 @@ Rig::Rig(const Scenario& scenario, int threads)
     generator_ = std::make_unique<PatternGenerator>(detector.bits);
     return;
   }
-  const double dark_e = detector.dark_mean_e(scenario.run.exposure);
-  const double faint_w_m2 = kUnseenShareOfNoise * detector.noise_e(dark_e) /
-                            detector.electrons_per_irradiance(scenario.run.exposure);
-  engine::Optics optics(scenario.optics, faint_w_m2, pool_);
+  engine::Optics optics(scenario.optics, faint_irradiance_w_m2(scenario), pool_);
   engine::RenderSpec render = scenario.render;
   render.grid = optics.wish();
-  const double noise_e = detector.noise_e(dark_e);
+  const double noise_e = detector.noise_e(detector.dark_mean_e(scenario.run.exposure));
   render.noise = {optics.throughput_sr() * detector.electrons_per_irradiance(scenario.run.exposure),
                   noise_e * noise_e, detector.full_well_e, optics.noise_blur_px()};
   render.clock = &hil::SteadyClock::stopwatch;

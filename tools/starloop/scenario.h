@@ -119,6 +119,11 @@ struct ScenarioSource {
 
 /// Of what the camera reads out. Throws engine::ConfigError.
 [[nodiscard]] engine::SensorMaps sensor_maps(const Scenario& scenario);
+/// How many a number on the command line means; 0: one for each processor.
+[[nodiscard]] int worker_threads(int wanted);
+/// Light on the detector that is lost in the noise of a dark pixel: how far the optics follow
+/// wings.
+[[nodiscard]] double faint_irradiance_w_m2(const Scenario& scenario);
 
 /// Everything that is built from a scenario once, before the first shutter opens.
 class Rig {

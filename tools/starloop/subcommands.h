@@ -32,6 +32,9 @@ struct MtfOptions {
 /// Writes every term of the optics' transfer function and their product, and draws them.
 int export_mtf(const CommonOptions& options, const MtfOptions& mtf);
 
+/// Measures the scenario's camera on a bench, beside what the scenario says; `out` is a folder.
+int characterize_camera(const CommonOptions& options, const std::string& out);
+
 struct RunOptions {
   bool open_loop = false;
   std::string out = "out";
