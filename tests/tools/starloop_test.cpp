@@ -330,6 +330,66 @@ TEST(StarloopMtf, WritesEveryTermAndTheirProduct) {
   EXPECT_NE(bad.err.find("/nonexistent/mtf.csv: cannot be written"), std::string::npos) << bad.err;
 }
 
+/// A camera so small that its bench takes a second.
+const std::vector<std::string> kSmallCamera = {
+    "--set", "camera.width_px=96", "--set", "camera.height_px=96", "--set", "detector.bits=12"};
+
+Outcome characterized(const fs::path& out, const std::vector<std::string>& more) {
+  std::vector<std::string> arguments = {"characterize", kFlyby, "--out", out.string()};
+  arguments.insert(arguments.end(), kSmallCamera.begin(), kSmallCamera.end());
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  return starloop(arguments);
+}
+
+TEST(StarloopCharacterize, WritesReportTablesAndPictures) {
+  const TemporaryFolder folder;
+  const fs::path out = folder.path() / "bench";
+  const Outcome run = characterized(out, {});
+  ASSERT_EQ(run.exit_code, kGood) << run.out << run.err;
+  const auto report = nlohmann::json::parse(content_of(out / "report.json"));
+  ASSERT_EQ(report["sensors"].size(), 2U);
+  EXPECT_EQ(report["sensors"][0]["bits"], 12);
+  EXPECT_EQ(report["sensors"][1]["bits"], 16);
+  for (const auto& sensor : report["sensors"]) {
+    const auto& gain = sensor["figures"][0];
+    EXPECT_EQ(gain["key"], "gain_dn_e");
+    EXPECT_NEAR(gain["measured"].get<double>() / gain["true"].get<double>(), 1.0, 0.005);
+  }
+  // The scenario has no pedestal: dark noise is cut off, and nobody says how large it is.
+  const auto& hidden = report["sensors"][0]["figures"][9];
+  EXPECT_EQ(hidden["key"], "read_noise_e");
+  EXPECT_TRUE(hidden["measured"].is_null());
+  EXPECT_EQ(hidden["standing"], "not measurable");
+  EXPECT_NEAR(report["sensors"][1]["figures"][9]["measured"].get<double>(), 2.0, 0.02);
+  for (const auto& edge : report["slanted_edge"])
+    EXPECT_LT(std::abs(edge["worst_deviation"].get<double>()), 0.01);
+  EXPECT_TRUE(report["missed"].empty());
+  EXPECT_GT(table_of(out / "ptc.csv").size(), 100U);
+  EXPECT_EQ(table_of(out / "dark.csv").size(), 1U + 2 * 17);
+  EXPECT_EQ(table_of(out / "edge.csv").size(), 1U + 2 * 101);
+  EXPECT_EQ(run.out.find(content_of(out / "report.txt")), 0U);
+  if (run.out.find("no pictures") == std::string::npos) {
+    for (const std::string name : {"transfer", "linearity", "dark", "snr", "edge"})
+      EXPECT_GT(fs::file_size(out / (name + ".png")), 10'000U) << name;
+  }
+}
+
+TEST(StarloopCharacterize, RefusesWhatItCannotMeasure) {
+  const TemporaryFolder folder;
+  const fs::path file = folder.path() / "file";
+  std::ofstream(file) << "here";
+  const Outcome taken = characterized(file, {});
+  EXPECT_EQ(taken.exit_code, kDeviceFault);
+  EXPECT_NE(taken.err.find(file.string()), std::string::npos) << taken.err;
+  const Outcome blind = characterized(folder.path() / "a", {"--set", "detector.pedestal_dn=5000"});
+  EXPECT_EQ(blind.exit_code, kBadInput);
+  EXPECT_NE(blind.err.find("flyby.toml: no light makes a signal"), std::string::npos) << blind.err;
+  const Outcome tiny = characterized(folder.path() / "b", {"--set", "camera.width_px=16"});
+  EXPECT_EQ(tiny.exit_code, kBadInput);
+  EXPECT_NE(tiny.err.find("32 pixels are the least"), std::string::npos) << tiny.err;
+  EXPECT_EQ(characterized(folder.path() / "c", {"--set", "detector.bits=7"}).exit_code, kBadInput);
+}
+
 TEST(StarloopPasses, PrintsALineForEach) {
   const Outcome quiet = starloop({"passes", kFlyby, "--quiet"});
   EXPECT_EQ(quiet.exit_code, kGood);

@@ -13,7 +13,7 @@ constexpr double kLinearityLimit = 0.2;  // %
 constexpr double kEdgeLimit = 0.01;
 constexpr double kSigmas = 5;
 constexpr double kBrightEdge = 0.8;  // of saturation
-constexpr int kEdgeFrames = 32;      // at least
+constexpr int kLeastEdgeFrames = 32;
 
 template <class... Values>
 std::string text_of(const char* format, Values... values) {
@@ -116,7 +116,8 @@ std::vector<EdgeFigures> characterize_edges(engine::Optics& optics,
   const engine::OtfCascade cascade(optics_spec);
   const auto lens = cascade.focused(cascade.seen_defocus_m(optics_spec.defocus_m(kFar_m, kFar_m)));
   EdgePlan plan;
-  plan.frames = frames_for(record.stack_values, optics_spec.camera, kEdgeFrames);
+  plan.frames =
+      frames_for(record.stack_values, optics_spec.camera, kLeastEdgeFrames, 8 * kLeastEdgeFrames);
   plan.bright_w_m2 = kBrightEdge * sensor.record.light[sensor.transfer.saturation].irradiance_w_m2;
   Bench bench(optics, sensor.spec, maps, optics_spec.camera, pool, seed);
   const FieldFrames field = take_field(bench, exposure, sensor.record.used, plan);

@@ -17,9 +17,20 @@ constexpr int kMostRows = 1024;  // that the edge crosses
 
 /// Columns and rows change places for an edge along the rows.
 struct View {
-  bool turned = false;
-  int width = 0;
-  int height = 0;
+  bool turned;
+  int width;
+  int height;
+  View(const engine::CameraGeometry& camera, bool near_vertical)
+      : turned(!near_vertical),
+        width(near_vertical ? camera.width_px : camera.height_px),
+        height(near_vertical ? camera.height_px : camera.width_px) {}
+
+  /// That the edge crosses, in the middle of the frame.
+  [[nodiscard]] int rows() const noexcept { return std::min(kMostRows, height / 2); }
+  /// How far it goes aside over half of them.
+  [[nodiscard]] double half_drift_px(const EdgePlan& plan) const noexcept {
+    return 0.5 * std::tan(plan.angle_deg * engine::kDegree) * rows();
+  }
   [[nodiscard]] std::size_t pixel(int u, int v) const noexcept {
     return turned ? static_cast<std::size_t>(u) * static_cast<std::size_t>(height) +
                         static_cast<std::size_t>(v)
@@ -74,6 +85,15 @@ void compare(const engine::OtfCascade& cascade, const engine::OtfCascade::Focuse
 
 }  // namespace
 
+double edge_reach_px(const engine::CameraGeometry& camera, bool near_vertical,
+                     const EdgePlan& plan) {
+  const View view(camera, near_vertical);
+  const double room_px = 0.5 * view.width - view.half_drift_px(plan) - 2.0;
+  if (room_px < kLeastReach_px)
+    throw std::runtime_error("the frame is too small for a slanted edge, 32 pixels are the least");
+  return std::min(plan.reach_px, room_px);
+}
+
 FieldFrames take_field(Bench& bench, engine::Duration exposure, const PixelMask& used,
                        const EdgePlan& plan) {
   bench.illuminate(0.0);
@@ -88,23 +108,17 @@ EdgeFigures measure_edge(Bench& bench, const FieldFrames& field, const engine::O
                          const engine::OtfCascade::Focused& lens, engine::Duration exposure,
                          const PixelMask& used, bool near_vertical, const EdgePlan& plan) {
   const engine::CameraGeometry& camera = bench.camera();
-  View view{!near_vertical, camera.width_px, camera.height_px};
-  if (view.turned) std::swap(view.width, view.height);
-  const double slope = std::tan(plan.angle_deg * engine::kDegree);
-  const int rows = std::min(kMostRows, view.height / 2);
-  const double half_drift_px = 0.5 * slope * rows;
-  const double reach_px = std::min(plan.reach_px, 0.5 * view.width - half_drift_px - 2.0);
-  if (reach_px < kLeastReach_px)
-    throw std::runtime_error("slanted edge: the frame is too small, 32 pixels are the least");
-
+  const View view(camera, near_vertical);
+  const int rows = view.rows();
+  const double reach_px = edge_reach_px(camera, near_vertical, plan);
   const PixelPoint middle = view.place({0.5 * (view.width - 1), 0.5 * (view.height - 1)});
   const PixelPoint normal = view.place(
       {std::cos(plan.angle_deg * engine::kDegree), -std::sin(plan.angle_deg * engine::kDegree)});
   bench.illuminate(edge_light(bench, middle, normal, plan.bright_w_m2));
   const ImageStack edge = bench.stack(exposure, plan.frames, used);
 
-  const int half =
-      std::min(static_cast<int>(std::ceil(reach_px + half_drift_px)) + 2, view.width / 2);
+  const int half = std::min(static_cast<int>(std::ceil(reach_px + view.half_drift_px(plan))) + 2,
+                            view.width / 2);
   const int top = (view.height - rows) / 2;
   const engine::PixelRect part{view.width / 2 - half, top, view.width / 2 + half, top + rows};
   EdgeFigures out;

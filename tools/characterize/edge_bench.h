@@ -31,6 +31,11 @@ struct EdgePlan {
   double bright_w_m2 = 0;  ///< irradiance on the bright side
 };
 
+/// How far to each side of the edge a frame lets us see. Throws std::runtime_error when that is too
+/// little.
+[[nodiscard]] double edge_reach_px(const engine::CameraGeometry& camera, bool near_vertical,
+                                   const EdgePlan& plan);
+
 [[nodiscard]] FieldFrames take_field(Bench& bench, engine::Duration exposure, const PixelMask& used,
                                      const EdgePlan& plan);
 

@@ -73,10 +73,11 @@ Quantity ImageStack::spatial_variance_dn2() const {
     squares += d * d;
   }
   const auto n = static_cast<double>(used_);
-  const double whole = squares / (n - 1.0) / (1.0 * frames_ * frames_);
   const Quantity temporal = temporal_variance_dn2();
-  return {whole - temporal.value / frames_,
-          std::hypot(whole * std::sqrt(2.0 / n), temporal.error / frames_)};
+  const double rest = temporal.value / frames_;
+  const double pattern = squares / (n - 1.0) / (1.0 * frames_ * frames_) - rest;
+  return {pattern, std::hypot(std::sqrt((4.0 * std::max(pattern, 0.0) + 2.0 * rest) * rest / n),
+                              temporal.error / frames_)};
 }
 
 double ImageStack::share_at_zero() const noexcept {

@@ -32,7 +32,8 @@ class ImageStack {
   [[nodiscard]] Quantity mean_dn() const;
   /// Pre: two frames at least.
   [[nodiscard]] Quantity temporal_variance_dn2() const;
-  /// May be negative where there is no pattern. Pre: two frames at least.
+  /// May be negative where there is no pattern. The error is of these pixels' pattern, not of what
+  /// other sensors of the kind have. Pre: two frames at least.
   [[nodiscard]] Quantity spatial_variance_dn2() const;
   /// Of all values, the share that are 0 DN.
   [[nodiscard]] double share_at_zero() const noexcept;

@@ -46,8 +46,9 @@ std::string deviation_of(const Figure& figure) {
 }
 
 std::string sigmas_of(const Figure& figure) {
+  // A mean of sizes is never 0.
   const bool told = figure.standing == Standing::kMeasured && figure.measured.error > 0.0 &&
-                    std::abs(figure.sigmas()) < kSigmasAreTold;
+                    figure.key != "linearity_error" && std::abs(figure.sigmas()) < kSigmasAreTold;
   return told ? fixed(figure.sigmas(), 1) : "";
 }
 

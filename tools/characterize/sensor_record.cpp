@@ -41,7 +41,9 @@ double saturating_w_m2(Bench& bench, Duration exposure) {
   for (int doublings = 0;; ++doublings) {
     const double next_dn = response(2.0 * high);
     if (top_dn > dark_dn && next_dn - dark_dn < 1.001 * (top_dn - dark_dn)) break;
-    if (doublings > 40) throw std::runtime_error("no light saturates the sensor");
+    if (doublings > 40)
+      throw std::runtime_error(top_dn > dark_dn ? "no light saturates the sensor"
+                                                : "no light makes a signal in the sensor");
     top_dn = next_dn;
     high *= 2.0;
   }
@@ -99,9 +101,9 @@ std::vector<double> shares_of_light(int levels) {
 
 }  // namespace
 
-int frames_for(std::size_t values, const engine::CameraGeometry& camera, int least) {
+int frames_for(std::size_t values, const engine::CameraGeometry& camera, int least, int most) {
   const double frames = static_cast<double>(values) / (1.0 * camera.width_px * camera.height_px);
-  return 2 * static_cast<int>(std::ceil(0.5 * std::clamp(frames, 1.0 * least, 256.0)));
+  return 2 * static_cast<int>(std::ceil(0.5 * std::clamp(frames, 1.0 * least, 1.0 * most)));
 }
 
 SensorRecord record_sensor(Bench& bench, Duration exposure, const RecordPlan& plan) {
@@ -110,8 +112,8 @@ SensorRecord record_sensor(Bench& bench, Duration exposure, const RecordPlan& pl
   out.used.assign(pixels_of(bench), 1);
   const double full_w_m2 = saturating_w_m2(bench, exposure);
   const Duration longest = longest_exposure(bench, exposure);
-  const int frames = frames_for(plan.level_values, bench.camera(), 2);
-  const int many = frames_for(plan.stack_values, bench.camera(), kDefectFrames);
+  const int frames = frames_for(plan.level_values, bench.camera(), 2, 32);
+  const int many = frames_for(plan.stack_values, bench.camera(), kDefectFrames, 64);
 
   // Defects first: they count nowhere.
   bench.illuminate(0.0);

@@ -11,13 +11,14 @@ namespace characterize {
 /// How much a record takes.
 struct RecordPlan {
   int levels = 50;  ///< of light, evenly from dark to saturation
-  /// Values of pixels at each level: so many frames as that takes, two at least.
+  /// Values of pixels at each level: so many frames as that takes, 2 to 32.
   std::size_t level_values = std::size_t{2} << 20;
-  std::size_t stack_values = std::size_t{64} << 20;  ///< that a pattern is found in
+  std::size_t stack_values = std::size_t{64} << 20;  ///< that show a pattern: 16 to 64 frames
 };
 
-/// An even number of frames that have so many values of pixels together: between `least` and 256.
-[[nodiscard]] int frames_for(std::size_t values, const engine::CameraGeometry& camera, int least);
+/// An even number of frames that have so many values of pixels together, between two limits.
+[[nodiscard]] int frames_for(std::size_t values, const engine::CameraGeometry& camera, int least,
+                             int most);
 
 /// What a stack of frames says.
 struct StackFigures {

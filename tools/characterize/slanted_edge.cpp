@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <limits>
 #include <stdexcept>
 
 #include "engine/core/constants.h"
@@ -23,8 +24,9 @@ double window(double x) {
   return t <= 0.5 ? 1.0 : 0.5 + 0.5 * std::cos(engine::kPi * (2.0 * t - 1.0));
 }
 
-/// The middle of a row's rise about `guess`; of the whole row when `half_px` reaches that far.
-double crossing(const EdgeImage& image, int v, double guess, double half_px) {
+/// The middle of a row's rise about `guess`, by what is within `half_px`; not a number for a row
+/// that rises nowhere, or with a pixel that is none unless the row is taken as it is.
+double crossing(const EdgeImage& image, int v, double guess, double half_px, bool as_it_is) {
   double sum = 0;
   double moment = 0;
   for (int u = 0; u + 1 < image.width; ++u) {
@@ -32,28 +34,31 @@ double crossing(const EdgeImage& image, int v, double guess, double half_px) {
     const double weight = window((place - guess) / half_px);
     if (weight == 0.0) continue;
     const double rise = weight * (image.at(u + 1, v) - image.at(u, v));
-    if (std::isnan(rise)) continue;
+    if (as_it_is && std::isnan(rise)) continue;
     sum += rise;
     moment += rise * place;
   }
-  if (!(std::abs(sum) > 0.1)) throw std::runtime_error("slanted edge: a row has none");
-  return moment / sum;
+  return std::abs(sum) > 0.1 ? moment / sum : std::numeric_limits<double>::quiet_NaN();
 }
 
 /// Of the edge: u against v.
 Line find_edge(const EdgeImage& image) {
   constexpr int kRounds = 6;  // the window follows what it finds
-  std::vector<double> v;
-  for (int row = 0; row < image.height; ++row) v.push_back(row);
-  const std::vector<double> even(v.size(), 1.0);
-  std::vector<double> u(v.size());
+  constexpr std::size_t kLeastRows = 8;
   Line line;
   line.intercept.value = 0.5 * (image.width - 1);
   for (int round = 0; round < kRounds; ++round) {
     const double half_px = round == 0 ? image.width : kSearch_px;
-    for (std::size_t i = 0; i < v.size(); ++i)
-      u[i] = crossing(image, static_cast<int>(i), line.at(v[i]), half_px);
-    line = fit_line(v, u, even);
+    std::vector<double> rows;
+    std::vector<double> places;
+    for (int v = 0; v < image.height; ++v) {
+      const double place = crossing(image, v, line.at(v), half_px, round == 0);
+      if (std::isnan(place)) continue;
+      rows.push_back(v);
+      places.push_back(place);
+    }
+    if (rows.size() < kLeastRows) throw std::runtime_error("slanted edge: there is none");
+    line = fit_line(rows, places, std::vector<double>(rows.size(), 1.0));
   }
   return line;
 }

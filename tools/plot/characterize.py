@@ -65,7 +65,7 @@ def panels(sensors, height, rows=1, ratios=None, **options):
 
 
 def legend(axis, **options):
-    axis.legend(frameon=False, fontsize=9, **options)
+    axis.legend(facecolor="white", edgecolor="none", framealpha=0.85, fontsize=9, **options)
 
 
 def draw_transfer(report, light, _):

@@ -26,6 +26,9 @@ characterize::CameraReport measure(const Scenario& scenario, int threads) {
   characterize::CameraReport report;
   report.scenario = scenario.name;
   report.camera = camera;
+  // What cannot be measured is said before the rest is.
+  for (const bool near_vertical : {true, false})
+    (void)characterize::edge_reach_px(camera, near_vertical, {});
   const characterize::RecordPlan plan;
   const auto add_depth = [&](const engine::DetectorSpec& spec) {
     report.sensors.push_back(characterize::characterize_sensor(
