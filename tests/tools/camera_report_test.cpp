@@ -139,12 +139,12 @@ TEST(CameraReport, EdgesShowTheProductOfTheOptics) {
   SensorReport sensor;
   sensor.spec = camera.detector;
   sensor.record.used.assign(192 * 192, 1);
+  sensor.transfer.saturation_e.value = 20000;
   sensor.record.light.resize(1);
   sensor.record.light[0].irradiance_w_m2 =
       20000 / camera.detector.electrons_per_irradiance(kExposure);
-  const auto edges =
-      characterize::characterize_edges(lens, camera.optics_spec, sensor, camera.maps(), camera.pool,
-                                       1, kExposure, {.stack_values = std::size_t{4} << 20});
+  const auto edges = characterize::characterize_edges(lens, camera.optics_spec, sensor,
+                                                      camera.maps(), camera.pool, 1, kExposure);
   ASSERT_EQ(edges.size(), 2U);
   for (const auto& edge : edges) {
     EXPECT_NEAR(edge.angle_deg, 5.0, 0.02);
@@ -154,9 +154,8 @@ TEST(CameraReport, EdgesShowTheProductOfTheOptics) {
 
   // Against optics that do not shake it is too low by more than the limit.
   camera.optics_spec.jitter_rad = 0;
-  const auto steady =
-      characterize::characterize_edges(lens, camera.optics_spec, sensor, camera.maps(), camera.pool,
-                                       1, kExposure, {.stack_values = std::size_t{4} << 20});
+  const auto steady = characterize::characterize_edges(lens, camera.optics_spec, sensor,
+                                                       camera.maps(), camera.pool, 1, kExposure);
   EXPECT_LT(steady[0].worst, -0.01);
 }
 

@@ -27,7 +27,7 @@ struct CameraReport {
 };
 
 /// Limits: of the gain 1 % and of linearity .2 %, beyond five standard errors, of the edge's
-/// MTF .01.
+/// MTF .01 beyond three.
 [[nodiscard]] std::vector<std::string> missed_limits(const CameraReport& report);
 
 /// The same sensor read out to 16 bits, its pedestal high enough that noise stays above 0 DN.
@@ -41,10 +41,10 @@ struct CameraReport {
                                                engine::WorkerPool& pool, std::uint64_t seed,
                                                engine::Duration exposure, const RecordPlan& plan);
 
-/// Along both directions, by the frames of a sensor that has been measured.
+/// Along both directions, by a sensor that has been measured: as many frames as its noise asks for.
 [[nodiscard]] std::vector<EdgeFigures> characterize_edges(
     engine::Optics& optics, const engine::OpticsSpec& optics_spec, const SensorReport& sensor,
     const engine::SensorMaps& maps, engine::WorkerPool& pool, std::uint64_t seed,
-    engine::Duration exposure, const RecordPlan& plan);
+    engine::Duration exposure);
 
 }  // namespace characterize

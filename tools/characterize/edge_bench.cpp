@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "engine/core/constants.h"
+#include "engine/optics/mtf.h"
 
 namespace characterize {
 namespace {
@@ -77,7 +78,7 @@ void compare(const engine::OtfCascade& cascade, const engine::OtfCascade::Focuse
     const double f = out.response.cycles_per_px[i];
     out.analytic.push_back(std::abs(cascade.whole(f * normal.u, f * normal.v, lens)));
     const double off = out.response.mtf[i] - out.analytic.back();
-    if (std::abs(off) <= std::abs(out.worst)) continue;
+    if (f < out.least_cycles_per_px || std::abs(off) <= std::abs(out.worst)) continue;
     out.worst = off;
     out.worst_cycles_per_px = f;
   }
@@ -92,6 +93,19 @@ double edge_reach_px(const engine::CameraGeometry& camera, bool near_vertical,
   if (room_px < kLeastReach_px)
     throw std::runtime_error("the frame is too small for a slanted edge, 32 pixels are the least");
   return std::min(plan.reach_px, room_px);
+}
+
+double mtf_error(const engine::CameraGeometry& camera, bool near_vertical, const EdgePlan& plan) {
+  const double reach_px = edge_reach_px(camera, near_vertical, plan);
+  const double per_bin = View(camera, near_vertical).rows() * kEdgeBin_px;
+  // Of the edge and of the flat field, on the bright side; there the window is worth three quarters
+  // of its reach.
+  const double spread = std::sqrt(2.0 / (plan.frames * plan.bright_e * per_bin));
+  const double bins = 0.75 * reach_px / kEdgeBin_px;
+  const double difference = 2.0 * std::sin(0.5 * engine::kPi * kEdgeBin_px);
+  const double modulus = 1.0 / std::sqrt(2.0);
+  return spread * std::sqrt(bins) * difference * modulus /
+         std::pow(engine::sinc(0.5 * kEdgeBin_px), 2);
 }
 
 FieldFrames take_field(Bench& bench, engine::Duration exposure, const PixelMask& used,
@@ -124,6 +138,8 @@ EdgeFigures measure_edge(Bench& bench, const FieldFrames& field, const engine::O
   EdgeFigures out;
   out.near_vertical = near_vertical;
   out.response = slanted_edge(normalised(view, part, field, edge.mean_image_dn(), used), reach_px);
+  out.least_cycles_per_px = 1.0 / reach_px;
+  out.mtf_error = mtf_error(camera, near_vertical, plan);
   out.angle_deg = std::atan(out.response.slope) / engine::kDegree;
   compare(cascade, lens, view, out);
   return out;

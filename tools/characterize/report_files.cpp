@@ -94,10 +94,10 @@ std::string text_of(const EdgeFigures& edge) {
   char text[200];
   const auto& r = edge.response;
   std::snprintf(text, sizeof text,
-                "edge %.3f deg off the %s: MTF at Nyquist %.4f, analytic product %.4f; furthest "
-                "apart by %+.4f, at %.3f cycles/px\n",
+                "edge %.3f deg off the %s: MTF at Nyquist %.4f +- %.4f, analytic product %.4f; "
+                "furthest apart by %+.4f, at %.3f cycles/px\n",
                 edge.angle_deg, edge.near_vertical ? "columns" : "rows", r.mtf.back(),
-                edge.analytic.back(), edge.worst, edge.worst_cycles_per_px);
+                edge.mtf_error, edge.analytic.back(), edge.worst, edge.worst_cycles_per_px);
   return text;
 }
 
@@ -141,7 +141,9 @@ Json json_of(const CameraReport& report) {
     edges.push_back({{"near", edge.near_vertical ? "columns" : "rows"},
                      {"angle_deg", edge.angle_deg},
                      {"mtf_at_nyquist", edge.response.mtf.back()},
+                     {"mtf_error_at_nyquist", edge.mtf_error},
                      {"analytic_at_nyquist", edge.analytic.back()},
+                     {"compared_from_cycles_per_px", edge.least_cycles_per_px},
                      {"worst_deviation", edge.worst},
                      {"worst_cycles_per_px", edge.worst_cycles_per_px}});
   return {{"scenario", report.scenario},

@@ -62,7 +62,8 @@ class Table {
                         .measured = measured,
                         .truth = truth,
                         .standing = Standing::kMeasured,
-                        .note = {}});
+                        .note = {},
+                        .of_variance = false});
     return figures_.back();
   }
   void not_measurable(Figure& figure, const std::string& why) {
@@ -170,10 +171,12 @@ class Table {
     const Quantity signal = less(half.mean_dn, dark.mean_dn);
     const Quantity pattern = less(half.spatial_variance_dn2, dark.spatial_variance_dn2);
     add("prnu_1288", "PRNU1288", "%", times(ratio_of(root_of(pattern), signal), 100.0),
-        100.0 * truth_.prnu_rms);
+        100.0 * truth_.prnu_rms)
+        .of_variance = true;
     Figure& dsnu =
         add("dsnu_1288_e", "DSNU1288", "e-", ratio_of(root_of(dark.spatial_variance_dn2), gain_),
             truth_.dark_rate_rms_e_s * truth_.exposure_s);
+    dsnu.of_variance = true;
     if (!dark.shows_noise()) not_measurable(dsnu, why_not(dark));
     char range[60];
     std::snprintf(range, sizeof range, "at %.3g s", longest.exposure_s);
@@ -182,6 +185,7 @@ class Table {
             times(ratio_of(root_of(longest.spatial_variance_dn2), gain_), 1.0 / longest.exposure_s),
             truth_.dark_rate_rms_e_s);
     current.note = range;
+    current.of_variance = true;
     if (!longest.shows_noise()) not_measurable(current, why_not(longest));
   }
 

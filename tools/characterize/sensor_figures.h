@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -27,8 +28,15 @@ struct Figure {
   Standing standing = Standing::kMeasured;
   std::string note;
 
+  bool of_variance = false;  ///< the root of a variance, which may have been about 0
+
   /// Of a measured one: by how many standard errors it is off.
-  [[nodiscard]] double sigmas() const noexcept { return (measured.value - truth) / measured.error; }
+  [[nodiscard]] double sigmas() const noexcept {
+    const double value = measured.value;
+    const double error = measured.error;
+    if (!of_variance) return (value - truth) / error;
+    return (value * value - truth * truth) / std::max(2.0 * value * error, error * error);
+  }
 };
 
 /// What a sensor is like, over the pixels that are no defects: what the measurement should find.

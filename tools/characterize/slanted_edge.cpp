@@ -13,7 +13,6 @@
 namespace characterize {
 namespace {
 
-constexpr double kBin_px = 0.25;
 constexpr int kFrequencies = 100;
 constexpr double kSearch_px = 10;  // half the width of the window that finds the edge in a row
 
@@ -75,7 +74,7 @@ std::vector<Bin> bins_of(const EdgeImage& image, const EdgeResponse& edge, int h
   for (int v = 0; v < image.height; ++v) {
     for (int u = 0; u < image.width; ++u) {
       const double distance = (u - edge.offset_px - edge.slope * v) * to_distance;
-      const auto bin = static_cast<long>(std::floor(distance / kBin_px + 0.5)) + half;
+      const auto bin = static_cast<long>(std::floor(distance / kEdgeBin_px + 0.5)) + half;
       if (bin < 0 || bin >= static_cast<long>(bins.size()) || std::isnan(image.at(u, v))) continue;
       Bin& here = bins[static_cast<std::size_t>(bin)];
       here.value += image.at(u, v);
@@ -87,20 +86,20 @@ std::vector<Bin> bins_of(const EdgeImage& image, const EdgeResponse& edge, int h
 }
 
 void fill_spread(const EdgeImage& image, double reach_px, EdgeResponse& out) {
-  const int half = static_cast<int>(std::floor(reach_px / kBin_px));
+  const int half = static_cast<int>(std::floor(reach_px / kEdgeBin_px));
   const std::vector<Bin> bins = bins_of(image, out, half);
   std::vector<double> mean;
   for (std::size_t i = 0; i < bins.size(); ++i) {
     if (bins[i].count == 0)
       throw std::runtime_error("slanted edge: the image is too small for its window");
     mean.push_back(bins[i].value / bins[i].count);
-    out.distance_px.push_back((static_cast<double>(i) - half) * kBin_px);
+    out.distance_px.push_back((static_cast<double>(i) - half) * kEdgeBin_px);
   }
   // A bin's pixels lie off its middle, alike from pixel to pixel: 1 % of the MTF at Nyquist.
   out.spread = mean;
   for (std::size_t i = 1; i + 1 < bins.size(); ++i) {
     const double off_px = bins[i].distance / bins[i].count - out.distance_px[i];
-    out.spread[i] -= off_px * (mean[i + 1] - mean[i - 1]) / (2.0 * kBin_px);
+    out.spread[i] -= off_px * (mean[i + 1] - mean[i - 1]) / (2.0 * kEdgeBin_px);
   }
 }
 
@@ -109,13 +108,13 @@ void transform(double reach_px, EdgeResponse& out) {
     const double f = 0.5 * k / kFrequencies;
     std::complex<double> sum = 0;
     for (std::size_t i = 0; i + 1 < out.spread.size(); ++i) {
-      const double x = out.distance_px[i] + 0.5 * kBin_px;
+      const double x = out.distance_px[i] + 0.5 * kEdgeBin_px;
       sum += window(x / reach_px) * (out.spread[i + 1] - out.spread[i]) *
              std::polar(1.0, -2.0 * engine::kPi * f * x);
     }
     // Once for the bin's average, once for the difference.
     out.cycles_per_px.push_back(f);
-    out.mtf.push_back(std::abs(sum) / std::pow(engine::sinc(f * kBin_px), 2));
+    out.mtf.push_back(std::abs(sum) / std::pow(engine::sinc(f * kEdgeBin_px), 2));
   }
 }
 

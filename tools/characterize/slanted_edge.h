@@ -6,6 +6,9 @@
 
 namespace characterize {
 
+/// Of the spread function: ISO 12233's.
+inline constexpr double kEdgeBin_px = 0.25;
+
 /// A part of an image that an edge crosses from top to bottom, a few degrees off its columns: 0 far
 /// to one side of it, 1 to the other, which takes a dark and a flat image to make. Pixels that are
 /// not a number do not count.

@@ -211,11 +211,13 @@ def draw_edge(report, edges, spread):
     second.set_xlabel("cycles per pixel along the normal")
     second.set_ylim(0, 1.05)
     second.set_title("MTF", loc="left", fontsize=10.5)
+    third.axvspan(0, report["slanted_edge"][0]["compared_from_cycles_per_px"], color=FIT,
+                  alpha=0.08, linewidth=0)
     for limit in (-0.01, 0.01):
         third.axhline(limit, color=GREY, linewidth=0.9, linestyle=":")
     third.set_ylim(-0.0125, 0.0125)
     third.set_xlabel("cycles per pixel")
-    third.set_title("measured less analytic; dotted: the limit", loc="left", fontsize=10.5)
+    third.set_title("measured less analytic; grey: longer than the window", loc="left", fontsize=10.5)
     for axis, place in zip(axes, ("upper left", "upper right", "lower right")):
         legend(axis, loc=place)
     return figure

@@ -39,7 +39,7 @@ characterize::CameraReport measure(const Scenario& scenario, int threads) {
   if (scenario.detector.bits < kDeepest) add_depth(characterize::at_16_bits(scenario.detector));
   report.edges =
       characterize::characterize_edges(optics, scenario.optics, report.sensors.back(), maps, pool,
-                                       scenario.scene.seed, scenario.run.exposure, plan);
+                                       scenario.scene.seed, scenario.run.exposure);
   report.missed = characterize::missed_limits(report);
   return report;
 }
