@@ -47,7 +47,7 @@ def told(figure):
     places = 2 if not error else int(np.clip(1 - np.floor(np.log10(error)), 0, 7))
     truth = f"(true {figure['true']:.{places}f})"
     if figure["measured"] is None:
-        return f"not measurable, {unit} {truth}"
+        return f"not measurable (true {figure['true']:.{places}f} {unit})"
     sign = {"upper limit": "< ", "lower limit": "> "}.get(figure["standing"], "")
     spread = "" if sign or not error else f" ± {error:.{places}f}"
     return f"{sign}{figure['measured']:.{places}f}{spread} {unit} {truth}"
@@ -89,7 +89,7 @@ def draw_transfer(report, light, _):
         axis.loglog(x, np.where(fitted > 0, fitted, np.nan), color=FIT, linewidth=1,
                     label=f"K = {told(gain)}")
         axis.axvspan(0.05 * top, 0.7 * top, color=FIT, alpha=0.06, linewidth=0)
-        axis.text(0.19 * top, 0.03, "fit", color=GREY, fontsize=8.5, ha="center",
+        axis.text(0.19 * top, 0.015, "fit", color=GREY, fontsize=8.5, ha="center",
                   transform=axis.get_xaxis_transform())
         axis.plot(top, noise[peak], "o", markersize=9, fillstyle="none", color=Y,
                   label=f"saturation: {told(figures['saturation_capacity_e'])}")
@@ -98,7 +98,7 @@ def draw_transfer(report, light, _):
                   ha="right", transform=axis.get_yaxis_transform())
         axis.set_xlabel("mean over the dark, DN")
         axis.set_xlim(x[0], 2 * top)
-        axis.set_ylim(0.4 * min(QUANTISING, noise[seen].min()), 3 * noise[peak])
+        axis.set_ylim(0.2 * min(QUANTISING, noise[seen].min()), 3 * noise[peak])
         legend(axis, loc="upper left")
     axes[0, 0].set_ylabel("temporal variance, DN²")
     return figure
@@ -112,9 +112,9 @@ def draw_linearity(report, light, _):
         photons = level["photons"] * 1e-3
         above.plot(photons, level["mean_dn"], ".", color=X, markersize=5, label="measured")
         above.plot(photons, level["fitted_mean_dn"], color=FIT, linewidth=1,
-                   label=f"responsivity {told(figures['responsivity_dn_photon'])}")
+                   label=told(figures["responsivity_dn_photon"]).replace(" (", "\n("))
         above.set_ylim(0, 1.08 * level["mean_dn"].max())
-        legend(above, loc="lower right")
+        legend(above, loc="upper left")
         below.plot(photons, 100 * level["linearity_deviation"], ".-", color=X, linewidth=0.8,
                    markersize=5)
         below.axhline(0, color=FIT, linewidth=1)
@@ -179,7 +179,7 @@ def draw_snr(report, light, _):
         axis.plot([], [], color=MARK, label=f"threshold: {told(threshold)}")
         axis.plot([], [], color=Y, label=f"range: {told(figures['dynamic_range_db'])}")
         axis.set_xlabel("photons per pixel")
-        axis.set_ylim(0.1, None)
+        axis.set_ylim(0.006, None)
         axis.yaxis.set_major_formatter("{x:g}")
         legend(axis, loc="lower right")
     axes[0, 0].set_ylabel("signal to noise")
@@ -213,11 +213,13 @@ def draw_edge(report, edges, spread):
     second.set_title("MTF", loc="left", fontsize=10.5)
     third.axvspan(0, report["slanted_edge"][0]["compared_from_cycles_per_px"], color=FIT,
                   alpha=0.08, linewidth=0)
+    third.text(0.0, -0.0116, "  longer than the window", color=GREY, fontsize=8.5, rotation=90,
+               va="bottom")
     for limit in (-0.01, 0.01):
         third.axhline(limit, color=GREY, linewidth=0.9, linestyle=":")
     third.set_ylim(-0.0125, 0.0125)
     third.set_xlabel("cycles per pixel")
-    third.set_title("measured less analytic; grey: longer than the window", loc="left", fontsize=10.5)
+    third.set_title("measured less analytic", loc="left", fontsize=10.5)
     for axis, place in zip(axes, ("upper left", "upper right", "lower right")):
         legend(axis, loc=place)
     return figure
