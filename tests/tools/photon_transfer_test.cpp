@@ -128,6 +128,12 @@ TEST(PhotonTransfer, RefusesLightThatNeverSaturates) {
   EXPECT_THROW((void)characterize::photon_transfer({}), std::runtime_error);
 }
 
+TEST(PhotonTransfer, RefusesNoiseThatTheQuantiserHides) {
+  ToySensor sensor;
+  sensor.gain_dn_e = 0.01;  // at 70 % of saturation .28 DN^2
+  EXPECT_THROW((void)characterize::photon_transfer(sensor.levels()), std::runtime_error);
+}
+
 TEST(PhotonTransfer, ThresholdIsWhereSignalEqualsNoise) {
   // Noise of 3 e- besides the light's own: n^2 = 9 + n.
   const double n = 0.5 + std::sqrt(9.25);

@@ -23,6 +23,7 @@ struct CameraReport {
   engine::CameraGeometry camera;
   std::vector<SensorReport> sensors;
   std::vector<EdgeFigures> edges;
+  std::string refused;  ///< why the scenario's own depth is not among the sensors; empty: it is
   std::vector<std::string> missed;  ///< what is further from the truth than it may be
 };
 

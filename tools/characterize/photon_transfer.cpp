@@ -49,9 +49,13 @@ std::vector<std::size_t> between(const std::vector<LightLevel>& levels, std::siz
 /// they weigh would pull the line down.
 Line fit_transfer(const std::vector<LightLevel>& levels, const std::vector<std::size_t>& use) {
   Columns columns;
-  for (const std::size_t i : use) columns.add(levels[i].mean_dn.value, levels[i].variance_dn2);
+  for (const std::size_t i : use)
+    if (levels[i].variance_dn2.value >= kEvenVariance_dn2)
+      columns.add(levels[i].mean_dn.value, levels[i].variance_dn2);
+  if (columns.x.size() < kLeastLevels)
+    throw std::runtime_error("photon transfer: the quantiser hides the noise of light");
   const Line first = columns.fit();
-  for (std::size_t k = 0; k < use.size(); ++k)
+  for (std::size_t k = 0; k < columns.x.size(); ++k)
     columns.sigma[k] *= std::max(first.at(columns.x[k]) / columns.y[k], 1e-3);
   return columns.fit();
 }

@@ -13,6 +13,10 @@ inline constexpr double kQuantisingVariance_dn2 = 1.0 / 12.0;
 /// it is less (EMVA 1288 release 4, section 6.7).
 inline constexpr double kLeastVariance_dn2 = 0.24;
 
+/// From here on a quantiser adds kQuantisingVariance_dn2 wherever between two DN the mean lies, to
+/// 4 exp(-2 pi^2 variance), a few thousandths of a per cent.
+inline constexpr double kEvenVariance_dn2 = 0.5;
+
 /// What the frames at one level of light say, the exposure time being the same at all.
 struct LightLevel {
   double irradiance_w_m2 = 0;  ///< on the detector
@@ -26,6 +30,7 @@ struct LightLevel {
 ///
 /// We differ in two things: lines are fitted from 5 % of saturation on, not from 0, and with an
 /// intercept, so that a dark image cut off at 0 DN, or a quantiser that rounds down, tips no line.
+/// Levels whose variance the quantiser distorts have no part in the gain.
 struct PhotonTransfer {
   static constexpr double kFitFrom = 0.05;  ///< of the signal at saturation
   static constexpr double kFitTo = 0.70;
@@ -47,7 +52,8 @@ struct PhotonTransfer {
 };
 
 /// Levels in order of light, the first of them dark. Throws std::runtime_error when no line can be
-/// fitted: too few levels, none at saturation, or light that makes no signal.
+/// fitted: too few levels, noise that the quantiser hides, none at saturation, or light that makes
+/// no signal.
 [[nodiscard]] PhotonTransfer photon_transfer(const std::vector<LightLevel>& levels);
 
 /// rms of the noise in electrons that does not come from quantising. Pre: the variance is

@@ -149,6 +149,7 @@ Json json_of(const CameraReport& report) {
   return {{"scenario", report.scenario},
           {"width_px", report.camera.width_px},
           {"height_px", report.camera.height_px},
+          {"refused", report.refused},
           {"sensors", sensors},
           {"slanted_edge", edges},
           {"missed", report.missed}};
@@ -220,7 +221,7 @@ void write_defects(std::ostream& csv, const CameraReport& report) {
 }  // namespace
 
 std::string text_of(const CameraReport& report) {
-  std::string text;
+  std::string text = report.refused.empty() ? "" : report.refused + "\n\n";
   for (const SensorReport& sensor : report.sensors) text += text_of(sensor);
   for (const EdgeFigures& edge : report.edges) text += text_of(edge);
   for (const std::string& missed : report.missed) text += "missed: " + missed + "\n";

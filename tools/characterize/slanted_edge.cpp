@@ -40,6 +40,22 @@ double crossing(const EdgeImage& image, int v, double guess, double half_px, boo
   return std::abs(sum) > 0.1 ? moment / sum : std::numeric_limits<double>::quiet_NaN();
 }
 
+struct Crossings {
+  std::vector<double> v;
+  std::vector<double> u;
+};
+
+Crossings crossings(const EdgeImage& image, const Line& guess, double half_px, bool as_it_is) {
+  Crossings found;
+  for (int v = 0; v < image.height; ++v) {
+    const double u = crossing(image, v, guess.at(v), half_px, as_it_is);
+    if (std::isnan(u)) continue;
+    found.v.push_back(v);
+    found.u.push_back(u);
+  }
+  return found;
+}
+
 /// Of the edge: u against v.
 Line find_edge(const EdgeImage& image) {
   constexpr int kRounds = 6;  // the window follows what it finds
@@ -48,16 +64,11 @@ Line find_edge(const EdgeImage& image) {
   line.intercept.value = 0.5 * (image.width - 1);
   for (int round = 0; round < kRounds; ++round) {
     const double half_px = round == 0 ? image.width : kSearch_px;
-    std::vector<double> rows;
-    std::vector<double> places;
-    for (int v = 0; v < image.height; ++v) {
-      const double place = crossing(image, v, line.at(v), half_px, round == 0);
-      if (std::isnan(place)) continue;
-      rows.push_back(v);
-      places.push_back(place);
-    }
-    if (rows.size() < kLeastRows) throw std::runtime_error("slanted edge: there is none");
-    line = fit_line(rows, places, std::vector<double>(rows.size(), 1.0));
+    Crossings found = crossings(image, line, half_px, round == 0);
+    // Every row has a defect.
+    if (found.v.size() < kLeastRows) found = crossings(image, line, half_px, true);
+    if (found.v.size() < kLeastRows) throw std::runtime_error("slanted edge: there is none");
+    line = fit_line(found.v, found.u, std::vector<double>(found.v.size(), 1.0));
   }
   return line;
 }

@@ -1,10 +1,9 @@
-#include "tools/characterize/camera_report.h"
-
-#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <stdexcept>
+#include <string>
 
+#include "tools/characterize/camera_report.h"
 #include "tools/characterize/report_files.h"
 #include "tools/starloop/plot_script.h"
 #include "tools/starloop/subcommands.h"
@@ -35,8 +34,14 @@ characterize::CameraReport measure(const Scenario& scenario, int threads) {
         optics, spec, maps, camera, pool, scenario.scene.seed, scenario.run.exposure, plan));
   };
   constexpr int kDeepest = 16;
-  add_depth(scenario.detector);
-  if (scenario.detector.bits < kDeepest) add_depth(characterize::at_16_bits(scenario.detector));
+  const int bits = scenario.detector.bits;
+  try {
+    add_depth(scenario.detector);
+  } catch (const std::runtime_error& e) {
+    if (bits == kDeepest) throw;
+    report.refused = std::to_string(bits) + " bits cannot be measured: " + e.what();
+  }
+  if (bits < kDeepest) add_depth(characterize::at_16_bits(scenario.detector));
   report.edges =
       characterize::characterize_edges(optics, scenario.optics, report.sensors.back(), maps, pool,
                                        scenario.scene.seed, scenario.run.exposure);
