@@ -49,6 +49,26 @@ double add_row(std::span<const float> row, std::span<const float> background, in
   return peak;
 }
 
+FieldLight find_brightest(const IrradianceImage& image) noexcept {
+  constexpr std::size_t kLanes = 16;  // side by side, for the processor has room for them
+  FieldLight found;
+  float most = 0.0F;
+  for (int v = 0; v < image.height(); ++v) {
+    const auto row = image.row(v);
+    std::array<float, kLanes> best{};
+    std::size_t u = 0;
+    for (; u + kLanes <= row.size(); u += kLanes)
+      for (std::size_t k = 0; k < kLanes; ++k) best[k] = std::max(best[k], row[u + k]);
+    for (; u < row.size(); ++u) best[0] = std::max(best[0], row[u]);
+    const float here = *std::ranges::max_element(best);
+    if (!(here > most)) continue;
+    most = here;
+    found.brightest_px = {1.0 * std::distance(row.begin(), std::ranges::find(row, here)), 1.0 * v};
+  }
+  found.brightest_w_m2 = static_cast<double>(most);
+  return found;
+}
+
 /// A run is a rectangle one row high; rows come from the top.
 void add_run(const PixelRect& run, FrameTruth& truth, TruthMask& mask) noexcept {
   mask.add({static_cast<std::uint16_t>(run.top), static_cast<std::uint16_t>(run.left),
@@ -125,7 +145,9 @@ FrameReport ImagingChain::expose(const Shot& shot, Budget budget, DnImage& out,
     report.stars =
         stars_->add(snapshot, radiance_, radiance_.uniform_w_m2_sr * optics_.throughput_sr(),
                     optics_.star_defocus_m(snapshot.range_m), optics_.shading(), irradiance_);
-  optics_.veil(irradiance_);
+  const double glare_w_m2 = optics_.veil(irradiance_);
+  report.light = find_brightest(irradiance_);
+  report.light.sky_w_m2 = radiance_.uniform_w_m2_sr * optics_.throughput_sr() + glare_w_m2;
   const Duration projected = now();
   report.detector =
       detector_.expose(irradiance_, shot.exposure, snapshot.seed, shot.sequence, electrons_);

@@ -93,6 +93,13 @@ class TruthMask {
   bool truncated_ = false;
 };
 
+/// Light on the detector: of the brightest pixel, whatever shines there, and of the even sky.
+struct FieldLight {
+  PixelPoint brightest_px;
+  double brightest_w_m2 = 0;
+  double sky_w_m2 = 0;
+};
+
 /// How long each stage took. All zero when nobody gave the chain a stopwatch.
 struct StageTimes {
   Duration geometry{};
@@ -107,6 +114,7 @@ struct FrameReport {
   OpticsReport optics;
   StarReport stars;
   DetectorReport detector;
+  FieldLight light;
   StageTimes times;
   int peak_dn = 0;
 };

@@ -47,8 +47,8 @@ void FieldShading::vignette(IrradianceImage& image, WorkerPool& pool) const noex
   pool.rows(0, image.height(), [&](int v) { vignette(v, image.row(v)); });
 }
 
-void FieldShading::veil(IrradianceImage& image, WorkerPool& pool) noexcept {
-  if (!(glare_ > 0.0)) return;
+double FieldShading::veil(IrradianceImage& image, WorkerPool& pool) noexcept {
+  if (!(glare_ > 0.0)) return 0.0;
   pool.rows(0, image.height(), [&](int v) {
     double sum = 0;
     for (const float light : image.row(v)) sum += static_cast<double>(light);
@@ -61,6 +61,7 @@ void FieldShading::veil(IrradianceImage& image, WorkerPool& pool) noexcept {
   pool.rows(0, image.height(), [&](int v) {
     for (float& light : image.row(v)) light = stays * light + even;
   });
+  return static_cast<double>(even);
 }
 
 }  // namespace engine

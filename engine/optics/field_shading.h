@@ -22,8 +22,9 @@ class FieldShading {
   void vignette(int v, std::span<float> row) const noexcept;
   void vignette(IrradianceImage& image, WorkerPool& pool) const noexcept;
   /// Spreads veiling_glare of all the light evenly over the frame, whose light stays as much as it
-  /// was. Leaves out: glare of what is beside the frame.
-  void veil(IrradianceImage& image, WorkerPool& pool) noexcept;
+  /// was. Returns how much a pixel has of it, in W/m^2. Leaves out: glare of what is beside the
+  /// frame.
+  double veil(IrradianceImage& image, WorkerPool& pool) noexcept;
 
  private:
   int width_px_;

@@ -66,8 +66,8 @@ class Optics {
   /// Overwrites `out`, of the camera's size: what reaches the detector but veiling glare. Pre:
   /// in.oversampling is wish().oversampling.
   OpticsReport project(const Radiance& in, IrradianceImage& out) noexcept;
-  /// Veiling glare of all light that there is.
-  void veil(IrradianceImage& out) noexcept { shading_.veil(out, pool_); }
+  /// Veiling glare of all light that there is; returns what each pixel has of it, in W/m^2.
+  double veil(IrradianceImage& out) noexcept { return shading_.veil(out, pool_); }
 
  private:
   /// What one transform is for: a share of the light, with its motion, at equal shares at several

@@ -21,7 +21,7 @@ characterize::CameraReport measure(const Scenario& scenario, int threads) {
   const engine::CameraGeometry& camera = scenario.scene.camera;
   engine::WorkerPool pool(worker_threads(threads));
   engine::Optics optics(scenario.optics, faint_irradiance_w_m2(scenario), pool);
-  const engine::SensorMaps maps(scenario.detector, camera.width_px, camera.height_px);
+  const engine::SensorMaps maps = sensor_maps(scenario);
   characterize::CameraReport report;
   report.scenario = scenario.name;
   report.camera = camera;

@@ -6,6 +6,7 @@
 #include "engine/core/constants.h"
 #include "engine/core/fits.h"
 #include "engine/orbit/utc.h"
+#include "tools/starloop/budget_table.h"
 #include "tools/starloop/frame_sheet.h"
 #include "tools/starloop/picture.h"
 #include "tools/starloop/subcommands.h"
@@ -92,6 +93,7 @@ void tell(const std::string& fits, const std::string& png, const Scenario& scena
   std::printf(
       "detector: %d px over the full well, %d cosmic rays, %d px whose light was no number\n",
       detector.full_well_px, detector.cosmic_rays, detector.no_light_px);
+  std::fputs(text_of(FrameBudget(scenario, report.light)).c_str(), stdout);
   if (!star_text.empty()) {
     const engine::StarReport& stars = report.stars;
     std::printf(
@@ -128,6 +130,9 @@ int render_frames(const CommonOptions& options, const RenderOptions& render) {
   const std::string sheet_png = std::filesystem::path(out).replace_extension(".png").string();
   const bool several = render.times_s.size() > 1;
   FrameSheet sheet(render.tile_px);
+  const std::string budget_csv =
+      std::filesystem::path(out).replace_extension("").string() + "_budget.csv";
+  BudgetTable budgets(budget_csv);
   for (std::size_t i = 0; i < render.times_s.size(); ++i) {
     const double time_s = render.times_s[i];
     Rig rig(scenario, options.threads);
@@ -140,9 +145,11 @@ int render_frames(const CommonOptions& options, const RenderOptions& render) {
     const std::string png = std::filesystem::path(fits).replace_extension(".png").string();
     engine::write_fits(fits.string(), frame, header_of(scenario, time_s, report));
     write_png(png, frame, scenario.detector.bits);
+    budgets.add(i, FrameBudget(scenario, report.light));
     sheet.add(frame, report.truth.target_px, label_of(time_s, report.truth));
     if (!options.quiet) tell(fits.string(), png, scenario, rig.star_text(), report);
   }
+  budgets.close();
   if (several) {
     sheet.write(sheet_png);
     if (!options.quiet) std::printf("%s: all of them\n", sheet_png.c_str());

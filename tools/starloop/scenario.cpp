@@ -101,6 +101,8 @@ void read_record(const ConfigTable& table, RunSpec& run) {
 tracker::TrackerSpec read_tracker(const ConfigTable& table, const engine::CameraGeometry& camera) {
   tracker::TrackerSpec spec;
   spec.ifov_rad = camera.ifov_rad();
+  spec.boresight_off_px = {camera.principal_point().u - std::floor(0.5 * camera.width_px),
+                           camera.principal_point().v - std::floor(0.5 * camera.height_px)};
   spec.threshold_sigma =
       table.number_or("threshold_sigma", spec.threshold_sigma, engine::positive());
   spec.alpha = table.number_or("alpha", spec.alpha, engine::between(0.0, 1.0));

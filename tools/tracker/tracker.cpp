@@ -225,9 +225,11 @@ void Tracker::filter(const drivers::FrameView& view, hil::Detection& detection) 
   const engine::SimTime middle = view.frame.shutter_open + view.frame.exposure / 2;
   // Where the target is seen, less where it ought to be seen; the boresight has to move that way.
   const std::array<double, 2> measured{
-      (detection.centroid_px.u - std::floor(0.5 * width_px_)) * spec_.ifov_rad +
+      (detection.centroid_px.u - std::floor(0.5 * width_px_) - spec_.boresight_off_px.u) *
+              spec_.ifov_rad +
           view.frame.trim_rad[0],
-      (detection.centroid_px.v - std::floor(0.5 * height_px_)) * spec_.ifov_rad +
+      (detection.centroid_px.v - std::floor(0.5 * height_px_) - spec_.boresight_off_px.v) *
+              spec_.ifov_rad +
           view.frame.trim_rad[1]};
   const double dt = engine::seconds(middle - last_seen_);
   const auto predicted_rad = [&](std::size_t i) {
