@@ -170,7 +170,8 @@ BENCHMARK(bench_detector_frame)
     ->ArgsProduct({{0, 1, 8, 15, 30, 100, 15000}, {11, 16}})
     ->Unit(benchmark::kMillisecond);
 
-/// Optics alone on one thread: a patched disc so many pixels across, smeared by so many.
+/// Optics alone on one thread: a patched disc so many pixels across, smeared by so many, or on a
+/// path of a swing of that amplitude.
 void bench_optics(benchmark::State& state) {
   const starloop::Scenario scenario = flyby();
   const double to_e = scenario.detector.electrons_per_irradiance(scenario.run.exposure);
@@ -181,7 +182,12 @@ void bench_optics(benchmark::State& state) {
   const int corner = 512 - across / 2;
   in.region = {corner, corner, corner + across, corner + across};
   in.grid.resize(3 * across, 3 * across);
-  in.motion_px = {static_cast<double>(state.range(1)), 0.0};
+  const auto moves_px = static_cast<double>(state.range(1));
+  in.path.bends = state.range(2) != 0;
+  if (!in.path.bends) in.motion_px = {moves_px, 0.0};
+  for (int i = 0; in.path.bends && i <= ImagePath::kSteps; ++i)
+    in.path.off_px[static_cast<std::size_t>(i)] = {
+        0.0, moves_px * std::sin(2.0 * kPi * i / ImagePath::kSteps)};
   const double bright = 15000.0 / (to_e * optics.throughput_sr());
   for (int v = 0; v < 3 * across; ++v)
     for (int u = 0; u < 3 * across; ++u) {
@@ -195,9 +201,10 @@ void bench_optics(benchmark::State& state) {
   state.counters["side_cells"] = 3 * Blur::fast_length(across + 2 * report.core_px);
 }
 BENCHMARK(bench_optics)
-    ->ArgNames({"across_px", "smear_px"})
-    ->ArgsProduct({{1, 10, 60, 110, 130, 800, 1000}, {0}})
-    ->ArgsProduct({{110}, {3, 146, 1000}})
+    ->ArgNames({"across_px", "smear_px", "path"})
+    ->ArgsProduct({{1, 10, 60, 110, 130, 800, 1000}, {0}, {0}})
+    ->ArgsProduct({{110}, {3, 146, 1000}, {0}})
+    ->ArgsProduct({{110}, {3, 80}, {1}})
     ->Unit(benchmark::kMillisecond);
 
 /// The bound of bench_optics: one real transform of so many cells a side (side_cells there).
