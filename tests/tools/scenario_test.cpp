@@ -1,5 +1,6 @@
 #include "tools/starloop/scenario.h"
 
+#include <cmath>
 #include <fstream>
 #include <optional>
 #include <sstream>
@@ -8,6 +9,8 @@
 
 #include <gtest/gtest.h>
 #include <starloop_test_paths.h>
+
+#include "engine/core/constants.h"
 
 namespace {
 
@@ -439,6 +442,64 @@ TEST(Scenario, CompanionsWantTheRendererThatKnowsThem) {
   ASSERT_TRUE(said.has_value());
   EXPECT_EQ(*said, "x.toml:" + std::to_string(line) +
                        ": render.method must be \"paths\" where there are companions");
+}
+
+TEST(Scenario, ASlowVibrationIsAPathAndAFastOneAnOtf) {
+  const std::vector<std::string> shaken = {"run.exposure_ms=5", "optics.vibration_urad=3",
+                                           "optics.vibration_direction_deg=90"};
+  const auto with = [&](const std::string& frequency) {
+    std::vector<std::string> all = shaken;
+    all.push_back("optics.vibration_hz=" + frequency);
+    return load(all);
+  };
+  const Scenario slow = with("599");  // 2.995 periods
+  EXPECT_EQ(slow.optics.vibration.amplitude_rad, 0.0);
+  ASSERT_EQ(slow.jitter.lines.size(), 1U);
+  EXPECT_DOUBLE_EQ(slow.jitter.lines[0].amplitude_rad, 3e-6);
+  EXPECT_DOUBLE_EQ(slow.jitter.lines[0].direction_rad, engine::kPi / 2.0);
+  EXPECT_EQ(slow.slow_vibration.lines.size(), 1U);
+  for (const char* frequency : {"601", "0"}) {
+    const Scenario fast = with(frequency);
+    EXPECT_DOUBLE_EQ(fast.optics.vibration.amplitude_rad, 3e-6);
+    EXPECT_TRUE(fast.jitter.lines.empty());
+  }
+  // A single frame has it, too: half a swing of 100 Hz, from 0 at a whole second.
+  const auto shot_of = [](const std::string& amplitude_urad) {
+    const Scenario half =
+        load({"run.exposure_ms=5", "optics.vibration_urad=" + amplitude_urad,
+              "optics.vibration_hz=100", "camera.width_px=64", "camera.height_px=64"});
+    const starloop::Rig rig(half, 1);
+    return rig.predicted_shot(engine::sim_time(309780.0), half.run.exposure);
+  };
+  const engine::AttitudeTrack still = shot_of("0").attitude;
+  const engine::AttitudeTrack swings = shot_of("3").attitude;
+  ASSERT_TRUE(swings.known_between);
+  for (const int step : {0, 4, 8, 16}) {
+    const Eigen::Vector3d off = swings.after(step).axes.matrix.row(2).transpose() -
+                                still.after(step).axes.matrix.row(2).transpose();
+    EXPECT_NEAR(off.norm(), 3e-6 * std::sin(engine::kPi * step / 16.0), 1e-10) << step;
+  }
+}
+
+TEST(Scenario, AWindowOfBinnedPixelsGoesThroughAllRooms) {
+  const Scenario s =
+      load({"camera.binning=2", "camera.window_left_px=200", "camera.window_width_px=600",
+            "camera.window_height_px=400", "detector.dead_columns=3", "optics.vignetting_r2=-0.2"});
+  EXPECT_EQ(s.scene.camera.width_px, 300);
+  EXPECT_EQ(s.scene.camera.height_px, 200);
+  EXPECT_EQ(s.render.camera.width_px, 300);
+  EXPECT_EQ(s.optics.camera.window.left_px, 100);
+  EXPECT_EQ(s.detector.binning, 2);
+  EXPECT_DOUBLE_EQ(s.detector.pixel_pitch_m, 13e-6);
+  // Twice the pitch wants more cells than the lattice has: paths by need, and said when not asked.
+  EXPECT_EQ(s.optics.oversampling, 5);
+  EXPECT_EQ(s.render.method, engine::RenderMethod::kPaths);
+  EXPECT_TRUE(complaint([] { (void)load({"camera.binning=2", "render.method=lattice"}); }));
+  // The tracker is told where the boresight is: (1024 / 2 + .5) / 2 - .5 - 100 and as much.
+  EXPECT_DOUBLE_EQ(150.0 + s.tracker.boresight_off_px.u, 155.75);
+  EXPECT_DOUBLE_EQ(100.0 + s.tracker.boresight_off_px.v, 255.75);
+  const engine::SensorMaps maps = starloop::sensor_maps(s);
+  EXPECT_EQ(maps.response().size(), 300U * 200U);
 }
 
 }  // namespace
