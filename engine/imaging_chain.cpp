@@ -63,7 +63,8 @@ FieldLight find_brightest(const IrradianceImage& image) noexcept {
     const float here = *std::ranges::max_element(best);
     if (!(here > most)) continue;
     most = here;
-    found.brightest_px = {1.0 * std::distance(row.begin(), std::ranges::find(row, here)), 1.0 * v};
+    const auto place = std::ranges::find(row, here) - row.begin();
+    found.brightest_px = {static_cast<double>(place), 1.0 * v};
   }
   found.brightest_w_m2 = static_cast<double>(most);
   return found;

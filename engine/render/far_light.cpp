@@ -47,6 +47,7 @@ RenderSpec picture_spec(const RenderSpec& spec) {
   picture.method = RenderMethod::kPaths;
   picture.samples_per_pixel = FarLight::kBatches * samples_for(spec);
   picture.bounce_share = std::max(spec.bounce_share, kBounceShare);
+  picture.camera = {};  // none of the real one's window
   picture.camera.width_px = picture.camera.height_px = FarLight::kSide_px;
   const double ifov_rad = 2.0 / (kFilled * kFar_radii * FarLight::kSide_px);
   picture.camera.focal_length_m = picture.camera.pixel_pitch_m / ifov_rad;
@@ -193,6 +194,7 @@ void FarLight::begin(const Snapshot& snapshot, const Kept& seen) noexcept {
   far.body_from_camera.matrix.col(1) = seen.y_axis;
   far.body_from_camera.matrix.col(2) = -seen.toward_camera;
   far.background_w_m2_sr = 0;
+  far.image_map = {};
   facets_are_ours_ = true;  // from its first batch on
   sum_ = sum2_ = last_mean_ = 0;
 }

@@ -73,7 +73,9 @@ double CameraGeometry::sensor_half_diagonal_px() const noexcept {
 std::optional<PixelPoint> CameraGeometry::project(const Vector3d& in_camera) const noexcept {
   if (distortion.none()) return project_straight(in_camera);
   if (!(in_camera.z() > 0.0)) return std::nullopt;
-  const Vector2d bent = distortion.apply(in_camera.head<2>() / in_camera.z());
+  const Vector2d straight = in_camera.head<2>() / in_camera.z();
+  if (!(straight.norm() <= distortion.reach_tan)) return std::nullopt;
+  const Vector2d bent = distortion.apply(straight);
   return PixelPoint{principal_point().u + pixels_per_radian() * bent.x(),
                     principal_point().v + pixels_per_radian() * bent.y()};
 }
@@ -146,12 +148,13 @@ void read_window(const ConfigTable& table, CameraGeometry& camera) {
 
 /// A distortion that folds the image has no way back: from the middle outwards, and further than
 /// the sensor's corners, for light from there blurs in.
-void check(const ConfigTable& table, const CameraGeometry& camera) {
+void check(const ConfigTable& table, CameraGeometry& camera) {
   constexpr int kDirections = 64;
   constexpr int kSteps = 64;
   constexpr double kBeyond = 1.25;
   constexpr double kLeastStretch = 0.1;
   if (camera.distortion.none()) return;
+  double straight_reach = 0;
   const double reach = kBeyond * camera.sensor_half_diagonal_px() * camera.ifov_rad();
   for (int i = 0; i < kDirections; ++i) {
     const double angle = 2.0 * kPi * i / kDirections;
@@ -162,11 +165,13 @@ void check(const ConfigTable& table, const CameraGeometry& camera) {
       const Matrix2d slope = camera.distortion.slope(straight * k / kSteps);
       folds = !(slope.determinant() > kLeastStretch && slope.trace() > 0.0);
     }
+    straight_reach = std::max(straight_reach, straight.norm());
     if (folds)
       table.fail("distortion_k1", "and the other terms fold the image within " +
                                       std::to_string(static_cast<int>(reach / camera.ifov_rad())) +
                                       " px of its middle: no direction falls there, or several");
   }
+  camera.distortion.reach_tan = straight_reach;
 }
 
 }  // namespace
@@ -180,8 +185,11 @@ CameraGeometry read_camera_geometry(const ConfigTable& table) {
   read_window(table, camera);
   Distortion& d = camera.distortion;
   const auto term = [&](const std::string& key) { return table.number_or(key, 0.0, any_number()); };
-  d = {term("distortion_k1"), term("distortion_k2"), term("distortion_k3"), term("distortion_p1"),
-       term("distortion_p2")};
+  d.k1 = term("distortion_k1");
+  d.k2 = term("distortion_k2");
+  d.k3 = term("distortion_k3");
+  d.p1 = term("distortion_p1");
+  d.p2 = term("distortion_p2");
   check(table, camera);
   camera.row_time_s = 1e-6 * table.number_or("row_time_us", 0.0, between(0.0, 1e6));
   return camera;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include "engine/core/config_reader.h"
@@ -15,6 +16,9 @@ namespace engine {
 struct Distortion {
   double k1 = 0, k2 = 0, k3 = 0;
   double p1 = 0, p2 = 0;
+  /// As far from the axis as the terms are good for: beyond, they may fold the image, and nothing
+  /// is seen.
+  double reach_tan = std::numeric_limits<double>::infinity();
 
   [[nodiscard]] bool none() const noexcept {
     return k1 == 0.0 && k2 == 0.0 && k3 == 0.0 && p1 == 0.0 && p2 == 0.0;

@@ -468,17 +468,20 @@ TEST(FarTarget, AMappedImageIsMovedAndStretchedWhateverItsForm) {
                         Case{300e3, RenderMethod::kLattice, FarTargetForm::kAuto},
                         Case{6000e3, RenderMethod::kLattice, FarTargetForm::kAuto},
                         Case{60000e3, RenderMethod::kPaths, FarTargetForm::kPoint}}) {
-    Rig rig(telescope, white_telescope(),
-            {.method = c.method, .side_px = 128, .samples = 3000, .form = c.form, .settled = true});
+    const auto see = [&](const Snapshot& snapshot) {
+      Rig rig(
+          telescope, white_telescope(),
+          {.method = c.method, .side_px = 128, .samples = 3000, .form = c.form, .settled = true});
+      (void)rig.render(snapshot);
+      return rig.project();
+    };
     Snapshot snapshot = from_afar(c.range_m);
-    (void)rig.render(snapshot);
-    const Rig::Seen straight = rig.project();
+    const Rig::Seen straight = see(snapshot);
     AffineMap& map = snapshot.image_map;
     map.slope << 1.1, 0.05, -0.02, 0.95;
     const Eigen::Vector2d middle(64.0, 64.0);
     map.shift = middle - map.slope * middle + Eigen::Vector2d(3.25, -2.5);
-    (void)rig.render(snapshot);
-    const Rig::Seen mapped = rig.project();
+    const Rig::Seen mapped = see(snapshot);
     const PixelPoint want = map.apply(straight.centre);
     // Two renderings' noise, and wings that the frame cuts.
     EXPECT_NEAR(mapped.centre.u, want.u, 0.05) << c.range_m;

@@ -44,7 +44,7 @@ CameraGeometry bent_camera() {
   CameraGeometry camera;
   camera.focal_length_m = 1000.0 * camera.pixel_pitch_m;
   camera.height_px = 768;
-  camera.distortion = {-0.21, 0.13, -0.04, 0.0012, -0.0007};
+  camera.distortion = {.k1 = -0.21, .k2 = 0.13, .k3 = -0.04, .p1 = 0.0012, .p2 = -0.0007};
   return camera;
 }
 
@@ -164,6 +164,16 @@ TEST(ReadCameraGeometry, RefusesWhatHasNoPicture) {
   EXPECT_NO_THROW((void)read("distortion_k1 = -1e5\n"));
   EXPECT_THROW((void)read("distortion_k1 = -1e6\n"), ConfigError);
   EXPECT_THROW((void)read("distortion_p1 = 1e4\n"), ConfigError);
+}
+
+TEST(ReadCameraGeometry, WhatADistortionFoldsIntoTheFrameIsNotSeen) {
+  // At 4.3 mrad from the axis the terms have the sign of the image turned: 1 - 1e5 r^2 = -.85.
+  const CameraGeometry camera = read("distortion_k1 = -1e5\n");
+  const Eigen::Vector3d far(3.2e-3, 0.0, 1.0);
+  EXPECT_NEAR(camera.distortion.apply(far.head<2>()).x(), 0.0, 1e-4);
+  EXPECT_FALSE(camera.project(far).has_value());
+  EXPECT_FALSE(camera.map_near(far, {}, 1.0).has_value());
+  EXPECT_TRUE(camera.project(camera.direction_at({-64.0, 700.0})).has_value());
 }
 
 }  // namespace
