@@ -336,11 +336,19 @@ Rig::Rig(const Scenario& scenario, int threads)
       target_(scenario.target_orbit, epoch_),
       believed_target_(target_, scenario.target_knowledge),
       pool_(worker_threads(threads)) {
-  const engine::DetectorSpec& detector = scenario.detector;
   if (scenario.run.pattern) {
-    generator_ = std::make_unique<PatternGenerator>(detector.bits);
+    generator_ = std::make_unique<PatternGenerator>(scenario.detector.bits);
     return;
   }
+  Stages stages = make_stages(scenario);
+  generator_ = std::make_unique<engine::ImagingChain>(
+      stages.scene, std::move(stages.renderer), std::move(stages.optics),
+      engine::Detector(scenario.detector, pool_, sensor_maps(scenario)), scenario.detector,
+      scenario.scene.camera, &hil::SteadyClock::stopwatch, std::move(stages.stars));
+}
+
+Rig::Stages Rig::make_stages(const Scenario& scenario) {
+  const engine::DetectorSpec& detector = scenario.detector;
   engine::Optics optics(scenario.optics, faint_irradiance_w_m2(scenario), pool_);
   engine::RenderSpec render = scenario.render;
   render.grid = optics.wish();
@@ -364,11 +372,9 @@ Rig::Rig(const Scenario& scenario, int threads)
                           engine::StarLight(detector.mean_wavelength_m)),
         optics.splat(), detector);
   }
-  generator_ = std::make_unique<engine::ImagingChain>(
-      engine::SnapshotBuilder(scene, camera_, target_, move_companions(scenario)),
-      engine::make_renderer(render, bodies.front(), pool_, {bodies.begin() + 1, bodies.end()}),
-      std::move(optics), engine::Detector(detector, pool_, sensor_maps(scenario)), detector,
-      scenario.scene.camera, &hil::SteadyClock::stopwatch, std::move(stars));
+  return {engine::SnapshotBuilder(scene, camera_, target_, move_companions(scenario)),
+          engine::make_renderer(render, bodies.front(), pool_, {bodies.begin() + 1, bodies.end()}),
+          std::move(optics), std::move(stars)};
 }
 
 std::vector<engine::Companion> Rig::move_companions(const Scenario& scenario) {

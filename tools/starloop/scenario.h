@@ -130,6 +130,17 @@ class Rig {
  public:
   Rig(const Scenario& scenario, int threads);
 
+  /// What its generator is made of, but the detector.
+  struct Stages {
+    engine::SnapshotBuilder scene;
+    std::unique_ptr<engine::Renderer> renderer;
+    engine::Optics optics;
+    std::unique_ptr<engine::Starlight> stars;  ///< none: a sky without stars
+  };
+  /// For who looks between them, once. The rig outlives them.
+  [[nodiscard]] Stages make_stages(const Scenario& scenario);
+  [[nodiscard]] engine::WorkerPool& pool() noexcept { return pool_; }
+
   [[nodiscard]] engine::SceneGenerator& generator() noexcept { return *generator_; }
   /// Without an error.
   [[nodiscard]] hil::ScriptedPointing prediction() const;
