@@ -101,6 +101,16 @@ int run_command(int argc, char** argv) {
       ->check(CLI::Range(16, 1024))
       ->capture_default_str();
 
+  starloop::StagesOptions stages;
+  CLI::App* stages_app = app.add_subcommand(
+      "stages", "Write one frame with and without vibration, with and without photon noise");
+  add_common(*stages_app, common);
+  stages_app->add_option("--time", stages.time_s, "shutter opens, seconds after the epoch")
+      ->required()
+      ->check(CLI::Range(0.0, 9e9));
+  stages_app->add_option("--out", stages.out, "PNG of all four; a FITS of each goes beside it")
+      ->capture_default_str();
+
   starloop::MtfOptions mtf;
   CLI::App* mtf_app = app.add_subcommand(
       "mtf", "Write the terms of the optics' transfer function and their product, and draw them");
@@ -110,7 +120,8 @@ int run_command(int argc, char** argv) {
                    "shutter opens, seconds after the epoch: range and smear are those of then; "
                    "default: the pass' closest")
       ->check(CLI::Range(0.0, 9e9));
-  mtf_app->add_option("--out", mtf.out, "CSV file; the PNG goes beside it")->capture_default_str();
+  mtf_app->add_option("--out", mtf.out, "CSV file; the plane's and the PNGs go beside it")
+      ->capture_default_str();
 
   std::string bench_folder = "characterize";
   CLI::App* bench_app = app.add_subcommand(
@@ -151,6 +162,7 @@ int run_command(int argc, char** argv) {
   if (soak_app->parsed()) return starloop::soak(common, soak);
   if (replay_app->parsed()) return starloop::replay_log(replay);
   if (mtf_app->parsed()) return starloop::export_mtf(common, mtf);
+  if (stages_app->parsed()) return starloop::render_stages(common, stages);
   if (bench_app->parsed()) return starloop::characterize_camera(common, bench_folder);
   if (links_app->parsed()) return starloop::list_links();
   if (passes_app->parsed()) return starloop::list_passes(common, json);

@@ -25,11 +25,20 @@ struct RenderOptions {
 /// a picture of all of them besides.
 int render_frames(const CommonOptions& options, const RenderOptions& render);
 
+struct StagesOptions {
+  double time_s = 0;  ///< shutter opens
+  std::string out = "stages.png";
+};
+/// Writes one radiance as the camera would see it with and without vibration, with and without
+/// photon noise: a FITS of each, and one picture.
+int render_stages(const CommonOptions& options, const StagesOptions& stages);
+
 struct MtfOptions {
   double time_s = -1;  ///< shutter opens; below 0: at the chosen pass' closest
   std::string out = "mtf.csv";
 };
-/// Writes every term of the optics' transfer function and their product, and draws them.
+/// Writes every term of the optics' transfer function and their product, in four directions and
+/// over the plane, and draws them.
 int export_mtf(const CommonOptions& options, const MtfOptions& mtf);
 
 /// Measures the scenario's camera on a bench, beside what the scenario says; `out` is a folder.
