@@ -463,11 +463,12 @@ TEST(FarTarget, AMappedImageIsMovedAndStretchedWhateverItsForm) {
     double range_m;
     RenderMethod method;
     FarTargetForm form;
+    int samples;
   };
-  for (const Case& c : {Case{300e3, RenderMethod::kPaths, FarTargetForm::kAuto},
-                        Case{300e3, RenderMethod::kLattice, FarTargetForm::kAuto},
-                        Case{6000e3, RenderMethod::kLattice, FarTargetForm::kAuto},
-                        Case{60000e3, RenderMethod::kPaths, FarTargetForm::kPoint}}) {
+  for (const Case& c : {Case{300e3, RenderMethod::kPaths, FarTargetForm::kAuto, 2000},
+                        Case{300e3, RenderMethod::kLattice, FarTargetForm::kAuto, 50},
+                        Case{6000e3, RenderMethod::kLattice, FarTargetForm::kAuto, 50},
+                        Case{60000e3, RenderMethod::kPaths, FarTargetForm::kPoint, 50}}) {
     const auto see = [&](const Snapshot& snapshot) {
       Rig rig(
           telescope, white_telescope(),
