@@ -18,11 +18,11 @@ namespace tracker {
 struct TrackerSpec {
   double ifov_rad = 1.4444e-6;
   engine::PixelPoint boresight_off_px{};  ///< from the centre of pixel (width/2, height/2)
-  double threshold_sigma = 5;  ///< off the background, either way
-  double black_dn = 0;         ///< of the camera, where no light falls
-  double alpha = 0.8;          ///< share of a surprise that goes into the offset
-  double beta = 0.5;           ///< and into the rate
-  bool reports_only = false;   ///< says what it sees and asks for nothing
+  double threshold_sigma = 5;             ///< off the background, either way
+  double black_dn = 0;                    ///< of the camera, where no light falls
+  double alpha = 0.8;                     ///< share of a surprise that goes into the offset
+  double beta = 0.5;                      ///< and into the rate
+  bool reports_only = false;              ///< says what it sees and asks for nothing
 };
 
 /// An example of software under test: sees a frame's bytes, answers with a command's bytes.

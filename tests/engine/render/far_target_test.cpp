@@ -458,7 +458,7 @@ TEST(FarTarget, AKeptPictureCostsNoRays) {
 }
 
 TEST(FarTarget, AMappedImageIsMovedAndStretchedWhateverItsForm) {
-  const Mesh telescope = telescope_mesh();
+  const Mesh ball = test_support::sphere(6.0F, 12, 24, "white");
   struct Case {
     double range_m;
     RenderMethod method;
@@ -470,9 +470,12 @@ TEST(FarTarget, AMappedImageIsMovedAndStretchedWhateverItsForm) {
                         Case{6000e3, RenderMethod::kLattice, FarTargetForm::kAuto, 50},
                         Case{60000e3, RenderMethod::kPaths, FarTargetForm::kPoint, 50}}) {
     const auto see = [&](const Snapshot& snapshot) {
-      Rig rig(
-          telescope, white_telescope(),
-          {.method = c.method, .side_px = 128, .samples = 3000, .form = c.form, .settled = true});
+      Rig rig(ball, {lambert_material("white", 0.5)},
+              {.method = c.method,
+               .side_px = 128,
+               .samples = c.samples,
+               .form = c.form,
+               .settled = true});
       (void)rig.render(snapshot);
       return rig.project();
     };
