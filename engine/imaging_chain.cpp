@@ -161,7 +161,8 @@ FrameReport ImagingChain::expose(const Shot& shot, Budget budget, DnImage& out,
   truth.line_of_sight_rate_rad_s = snapshot.line_of_sight_rate_rad_s;
   truth.phase_angle_rad = snapshot.phase_angle_rad;
   truth.target_px = snapshot.target_px;
-  truth.smear_px = std::hypot(snapshot.smear_px.u, snapshot.smear_px.v);
+  const PixelPoint reach_px = ImageMotion{snapshot.smear_px, snapshot.path}.reach_px();
+  truth.smear_px = 2.0 * std::hypot(reach_px.u, reach_px.v);
   truth.visible_fraction = report.render.visible_fraction;
   truth.sun_irradiance_w_m2 = snapshot.sun.irradiance_w_m2;
   truth.earthshine_w_m2 = snapshot.earthshine.irradiance_w_m2;

@@ -39,10 +39,10 @@ struct FrameTruth {
   /// before it is blurred: the same but where the frame's edge cuts the target.
   PixelPoint photocentre_px{std::numeric_limits<double>::quiet_NaN(),
                             std::numeric_limits<double>::quiet_NaN()};
-  double smear_px = 0;
-  double peak_e = 0;  ///< of the target's light, as below
-  PixelRect box;      ///< around the mask; empty when the mask is
-  int mask_px = 0;    ///< pixels of the mask, of those too that it had no room for
+  double smear_px = 0;  ///< twice as far as its image is from where it is at mid-exposure
+  double peak_e = 0;    ///< of the target's light, as below
+  PixelRect box;        ///< around the mask; empty when the mask is
+  int mask_px = 0;      ///< pixels of the mask, of those too that it had no room for
   /// Of all the mask's light against its shot noise and that of the background; 0 without a mask.
   double signal_to_noise = 0;
   double visible_fraction = 0;  ///< RenderReport's: of the target, in the frame, lit or not
