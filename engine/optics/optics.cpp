@@ -80,11 +80,12 @@ Optics::Optics(const OpticsSpec& spec, double faint_w_m2, WorkerPool& pool)
       shading_(spec),
       wings_(wing_law_, width_of_point(spec), longest_px(spec) + 2 * spec.largest_wing_px, pool),
       core_(longest_px(spec) + 2 * kLargestCore_px, spec.oversampling, pool),
-      core_otf_(1.0 / spec.oversampling, 1,
+      core_otf_(1.0 / spec.oversampling, spec.oversampling > 1 ? 1 : 0,
                 spec.oversampling * Blur::fast_length(longest_px(spec) + 2 * kLargestCore_px)),
       least_core_px_(static_cast<int>(std::lround(kCore_px * width_of_point(spec)))),
       splat_(std::make_unique<PointSplat>(spec, cascade_, faint_w_m2, pool)),
-      cell_splat_(spec, cascade_, faint_w_m2, pool, {1.0 / spec.oversampling, &wings_}),
+      cell_splat_(spec, cascade_, faint_w_m2, pool,
+                  {spec.oversampling > 1 ? 1.0 / spec.oversampling : 0.0, &wings_}),
       whole_table_(kTableSteps + 2),
       core_table_(kTableSteps + 2) {
   tabulate();
@@ -295,12 +296,14 @@ const RadianceImage& Optics::without_broken(const RadianceImage& light,
 }
 
 /// Makes points of cells so bright that the rounding of their transform would be seen; of too many
-/// none, for then what they light up is as bright; nor out of focus, where their light is thin.
+/// none, for then what they light up is as bright; nor out of focus, where their light is thin; nor
+/// on the paper's grid, whose faults they would not have.
 /// Their wings are FarWings' business.
 const RadianceImage& Optics::take_bright_cells(const Radiance& in, const RadianceImage& light,
                                                const Survey& found) noexcept {
   bright_.clear();
-  if (found.bright == 0 || found.bright > kMostBright || defocus_m_ != 0.0 || !wings_apart())
+  if (found.bright == 0 || found.bright > kMostBright || defocus_m_ != 0.0 || !wings_apart() ||
+      oversampling_ == 1)
     return light;
   own(light);
   const double cell_px = 1.0 / oversampling_;

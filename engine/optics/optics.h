@@ -31,7 +31,8 @@ struct OpticsReport {
 ///
 /// L pi/4 (D/f)^2 tau, eq 15 of Li et al. 2023, on a grid of 3 cells to a pixel's side, or as many
 /// as carry what the lens passes: the paper's passes 178 lp/mm where its pixels end at 77, so that
-/// the product of MTFs on the pixel grid (OpticsSpec::oversampling = 1) is 13 % wrong.
+/// the product of MTFs on the pixel grid, whose pixels it takes for points
+/// (OpticsSpec::oversampling = 1), is 13 % wrong.
 /// Terms: OtfCascade, the target out of focus by its own range, and linear smear. A cell is itself
 /// a square average, and the product takes that back out. The spread of light is followed to where
 /// it drops under `faint_w_m2` (rule B5), or to largest_wing_px: near by on the fine grid, further

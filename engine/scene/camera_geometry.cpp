@@ -152,10 +152,12 @@ void check(const ConfigTable& table, CameraGeometry& camera) {
   constexpr int kDirections = 64;
   constexpr int kSteps = 64;
   constexpr double kBeyond = 1.25;
+  constexpr double kBeyond_px = 120;  // at the least: more than what optics and Earth ask for
   constexpr double kLeastStretch = 0.1;
   if (camera.distortion.none()) return;
   double straight_reach = 0;
-  const double reach = kBeyond * camera.sensor_half_diagonal_px() * camera.ifov_rad();
+  const double corner_px = camera.sensor_half_diagonal_px();
+  const double reach = std::max(kBeyond * corner_px, corner_px + kBeyond_px) * camera.ifov_rad();
   for (int i = 0; i < kDirections; ++i) {
     const double angle = 2.0 * kPi * i / kDirections;
     const Vector2d bent = reach * Vector2d(std::cos(angle), std::sin(angle));

@@ -40,10 +40,11 @@ void SnapshotBuilder::see(const Propagator& body, const SightLine& line, const B
   out.smear_px = {at_close.u - at_open.u, at_close.v - at_open.v};
   const Eigen::Vector3d apparent = (middle.axes * line.apparent).unit;
   const auto map = spec_.camera.map_near(apparent, out.smear_px, seconds(shot.exposure));
-  out.image_map = map.value_or(AffineMap{});
+  // Where the camera sees nothing no renderer may draw either, whatever a pinhole would see.
+  out.image_map =
+      map.value_or(AffineMap{Eigen::Matrix2d::Identity(), Eigen::Vector2d(kNowhere.u, kNowhere.v)});
   out.target_px =
-      map ? LocalCamera(spec_.camera, out.image_map).project(apparent).value_or(kNowhere)
-          : kNowhere;
+      map ? map->apply(spec_.camera.project_straight(apparent).value_or(kNowhere)) : kNowhere;
 }
 
 void SnapshotBuilder::follow(const Shot& shot, Snapshot& out) const noexcept {

@@ -13,6 +13,7 @@
 #include <gtest/gtest.h>
 
 #include "engine/core/constants.h"
+#include "tools/characterize/sensor_figures.h"
 
 namespace {
 
@@ -80,6 +81,15 @@ TEST(CameraReport, EveryFigureIsWithinFourErrorsOfTheTruth) {
   EXPECT_NEAR(figure_of(report.figures, "dark_current_rms_e_s").truth, 150, 12);
   // 33 hot and 16 dead pixels, each with its chance; the faintest hot ones are not told.
   EXPECT_NEAR(static_cast<double>(report.record.defects.size()), 49, 4 * 7);
+}
+
+TEST(CameraReport, TheTruthOfABinnedPixelIsAllItsPhotosites) {
+  engine::DetectorSpec spec;
+  spec.dark_e_s = 30;
+  spec.background_e_s = 12;
+  spec.binning = 2;
+  const characterize::PixelMask all(16, 1);
+  EXPECT_DOUBLE_EQ(characterize::sensor_truth(spec, {}, all, 0.01).dark_rate_e_s, 4.0 * (30 + 12));
 }
 
 TEST(CameraReport, TellsWhenTheSensorIsNotWhatTheScenarioSays) {

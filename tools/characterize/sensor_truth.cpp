@@ -77,7 +77,7 @@ SensorTruth sensor_truth(const engine::DetectorSpec& spec, const engine::SensorM
   const Spread response = spread_of(maps.response(), used, 1.0);
   truth.mean_response = response.mean;
   truth.prnu_rms = response.rms / response.mean;
-  const Spread dark = spread_of(maps.dark_e_s(), used, spec.dark_rate_e_s() + spec.background_e_s);
+  const Spread dark = spread_of(maps.dark_e_s(), used, spec.dark_mean_e(std::chrono::seconds(1)));
   truth.dark_rate_e_s = dark.mean;
   truth.dark_rate_rms_e_s = dark.rms;
   truth.offset_dn = spec.pedestal_dn - (spec.quantiser == engine::Quantiser::kFloor ? 0.5 : 0.0);

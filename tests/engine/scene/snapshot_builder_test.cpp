@@ -393,5 +393,27 @@ TEST(SnapshotBuilder, ATargetIsSeenWhereDistortionAndARollingShutterPutIt) {
   EXPECT_GT(std::abs(rows), 1.5);
 }
 
+TEST(SnapshotBuilder, WhatDistortionPutsOutOfSightIsNotDrawnByAPinholeEither) {
+  // Strong pincushion: what a pinhole would show in the frame's corner is far outside.
+  const Flyby flyby;
+  SceneSpec spec = spec_of(flyby);
+  const double ifov = spec.camera.ifov_rad();
+  spec.camera.distortion.k1 = 2.0 / std::pow(724.0 * ifov, 2);
+  spec.camera.distortion.reach_tan = 500.0 * ifov;
+  const SnapshotBuilder builder(spec, flyby.camera, flyby.target);
+  Shot shot = tracked_shot(flyby, kClosestOfPass3_s);
+  const auto& axes = shot.attitude.middle.axes.matrix;
+  const Vector3d aside = axes.row(2) + 380.0 * ifov * axes.row(0) + 380.0 * ifov * axes.row(1);
+  for (CameraAttitude* a : {&shot.attitude.open, &shot.attitude.middle, &shot.attitude.close})
+    *a = look_along(direction_of<J2000>(aside));
+  const Snapshot s = builder.build(shot);
+  EXPECT_LT(s.target_px.u, -1e8);
+  const Vector3d centre = s.body_from_camera.matrix.transpose() * -s.camera.m;
+  const auto straight = spec.camera.project_straight(centre);
+  ASSERT_TRUE(straight.has_value());
+  EXPECT_GT(straight->u, 0.0);  // a pinhole sees it
+  EXPECT_LT(LocalCamera(spec.camera, s.image_map).project(centre)->u, -1e8);
+}
+
 }  // namespace
 }  // namespace engine
