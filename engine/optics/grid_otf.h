@@ -46,9 +46,9 @@ class GridOtf {
  public:
   using Complex = FourierLines::Complex;
 
-  /// `cell_px`: a side of the grid's cells. `averages`: 0: a cell is a point; 1: a cell has the mean over its square; 2:
-  /// so averaged twice, which makes a pyramid over the cell and half of its neighbours. `longest`:
-  /// cells along a side of the grid, at most.
+  /// `cell_px`: a side of the grid's cells. `averages`: 0: a cell is a point; 1: a cell has the
+  /// mean over its square; 2: so averaged twice, which makes a pyramid over the cell and half of
+  /// its neighbours. `longest`: cells along a side of the grid, at most.
   GridOtf(double cell_px, int averages, int longest);
 
   /// For grids of this height in cells. What the first argument names is looked at until the next
