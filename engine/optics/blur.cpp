@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "engine/core/constants.h"
 
@@ -19,8 +20,19 @@ bool is_fast(int n) noexcept {
   return n == 1;
 }
 
+void transpose(std::array<Lanes, Lanes::kCount>& square) noexcept {
+  engine::transpose(square[0], square[1], square[2], square[3]);
+}
+
 std::complex<float> phase_of(double turns) noexcept {
   return std::complex<float>(std::polar(1.0, -2.0 * kPi * turns));
+}
+
+/// Calls work(from, to) for the `passed` frequencies from 0 on up, and those from -1 on down.
+template <class Work>
+void each_passed(std::size_t passed, std::size_t height, const Work& work) noexcept {
+  work(0, passed);
+  work(std::max(passed, height + 1 - passed), height);
 }
 
 }  // namespace
@@ -48,6 +60,7 @@ Blur::Blur(int longest, int step, WorkerPool& pool) : step_(step), pool_(pool) {
   line_real_.assign(at(shares), std::vector<Lanes>(at(side)));
   const std::size_t groups = at(side / 2 / Lanes::kCount + 1);
   turned_.resize(at(side));
+  passed_.resize(groups);
   spectrum_.resize(groups * at(side));
   folded_.resize(groups * at(samples));
   samples_.resize(at(samples) * at(samples));
@@ -73,32 +86,49 @@ void Blur::transform(const RadianceImage& picture, const Grid& grid, const GridO
   multiply_columns(grid.top, grid.top + rows, otf);
 }
 
+/// Four rows side by side; those below the picture are dark.
+void Blur::load_rows(const RadianceImage& picture, int first, std::span<Lanes> line) noexcept {
+  constexpr int kLanes = Lanes::kCount;
+  const auto lanes = line.subspan(at(grid_.left), at(picture.width()));
+  std::fill(line.begin(), lanes.begin(), Lanes{});
+  std::fill(lanes.end(), line.end(), Lanes{});
+  const int rows = std::min(kLanes, picture.height() - first);
+  std::size_t x = 0;
+  for (; rows == kLanes && x + kLanes <= lanes.size(); x += kLanes) {
+    Square square;
+    for (int lane = 0; lane < kLanes; ++lane)
+      std::memcpy(&square[at(lane)].v, &picture.row(first + lane)[x], sizeof(Lanes::Vector));
+    transpose(square);
+    std::ranges::copy(square, &lanes[x]);
+  }
+  for (; x < lanes.size(); ++x) {
+    lanes[x] = Lanes{};
+    for (int lane = 0; lane < rows; ++lane) lanes[x].v[lane] = picture.row(first + lane)[x];
+  }
+}
+
 void Blur::transform_rows(const RadianceImage& picture) noexcept {
   constexpr int kLanes = Lanes::kCount;
   share((picture.height() + kLanes - 1) / kLanes, [&](std::size_t s, int four) {
     const auto line = std::span(line_real_[s]).first(at(grid_.width));
-    std::ranges::fill(line, Lanes{});
-    for (int lane = 0; lane < kLanes; ++lane) {
-      const int y = four * kLanes + lane;
-      if (y >= picture.height()) break;
-      const auto cells = picture.row(y);
-      for (std::size_t x = 0; x < cells.size(); ++x) line[at(grid_.left) + x].v[lane] = cells[x];
-    }
+    load_rows(picture, four * kLanes, line);
+    // The last group may reach beyond the spectrum: what stands there is nothing.
     const auto half = std::span(line_out_[s]).first(line.size() / 2 + 1);
     lines_[s].forward(std::span<const Lanes>(line), half);
-    const std::size_t first = at(grid_.top + four * kLanes);
-    for (int g = 0; g < groups(); ++g) {
-      Complex* column = &spectrum_[at(g) * at(grid_.height) + first];
-      for (int lane = 0; lane < kLanes; ++lane) {
-        Lanes re;
-        Lanes im;
-        for (int c = 0; c < kLanes && g * kLanes + c < columns_; ++c) {
-          const Complex& value = half[at(g * kLanes + c)];
-          re.v[c] = value.real().v[lane];
-          im.v[c] = value.imag().v[lane];
-        }
-        column[lane] = Complex(re, im);
+    const Complex* wave = line_out_[s].data();
+    std::fill(&line_out_[s][at(columns_)], &line_out_[s][at(groups() * kLanes)], Complex{});
+    Complex* column = &spectrum_[at(grid_.top + four * kLanes)];
+    for (int g = 0; g < groups(); ++g, wave += kLanes, column += grid_.height) {
+      Square re;
+      Square im;
+      for (std::size_t c = 0; c < re.size(); ++c) {
+        re[c] = wave[c].real();
+        im[c] = wave[c].imag();
       }
+      transpose(re);
+      transpose(im);
+      for (std::size_t lane = 0; lane < re.size(); ++lane)
+        column[lane] = Complex(re[lane], im[lane]);
     }
   });
 }
@@ -114,8 +144,10 @@ void Blur::multiply_columns(int filled_from, int filled_to, const GridOtf& otf) 
     for (int c = 0; c < Lanes::kCount; ++c)
       fx.v[c] = static_cast<float>(static_cast<double>(g * Lanes::kCount + c) / grid_.width);
     const auto factors = std::span(line_in_[s]).first(line.size());
-    otf.fill_column(fx, factors);
-    for (std::size_t k = 0; k < line.size(); ++k) line[k] = waves[k] * factors[k];
+    passed_[at(g)] = otf.fill_column(fx, factors);
+    each_passed(passed_[at(g)], line.size(), [&](std::size_t from, std::size_t to) {
+      for (std::size_t k = from; k < to; ++k) line[k] = waves[k] * factors[k];
+    });
   });
 }
 
@@ -144,10 +176,12 @@ void Blur::fold_columns(double move_x, double move_y) noexcept {
       im.v[c] = turned.imag();
     }
     std::ranges::fill(sum, Complex{});
-    for (std::size_t k = 0; k < at(grid_.height); ++k)
-      sum[k % samples] +=
-          moves ? line[k] * Complex(re, im) * Complex(turned_[k].real(), turned_[k].imag())
-                : line[k];
+    each_passed(passed_[at(g)], at(grid_.height), [&](std::size_t from, std::size_t to) {
+      std::size_t j = from % samples;
+      for (std::size_t k = from; k < to; ++k, j = j + 1 < samples ? j + 1 : 0)
+        sum[j] += moves ? line[k] * Complex(re, im) * Complex(turned_[k].real(), turned_[k].imag())
+                        : line[k];
+    });
     lines_[s].inverse(std::span<const Complex>(sum),
                       std::span(folded_).subspan(at(g) * samples, samples));
   });
@@ -160,26 +194,35 @@ void Blur::sample_rows() noexcept {
   share(height / kLanes, [&](std::size_t s, int four) {
     const auto half = std::span(line_in_[s]).first(at(width / 2 + 1));
     std::ranges::fill(half, Complex{});
-    for (int column = 0; column < columns_; ++column) {
+    for (int column = 0; column < columns_; column += kLanes) {
       const Complex* group = &folded_[at(column / kLanes) * at(height) + at(four * kLanes)];
-      Lanes re;
-      Lanes im;
-      for (int lane = 0; lane < kLanes; ++lane) {
-        re.v[lane] = group[lane].real().v[column % kLanes];
-        im.v[lane] = group[lane].imag().v[column % kLanes];
+      Square re;
+      Square im;
+      for (std::size_t lane = 0; lane < re.size(); ++lane) {
+        re[lane] = group[lane].real();
+        im[lane] = group[lane].imag();
       }
-      // The wave itself and its mirror image, each where sampling folds it to.
-      const int k = column % width;
-      const int mirrored = (width - k) % width;
-      if (k <= width / 2) half[at(k)] += Complex(re, im);
-      const bool mirrors = column > 0 && 2 * column < grid_.width;
-      if (mirrors && mirrored <= width / 2) half[at(mirrored)] += Complex(re, -im);
+      transpose(re);
+      transpose(im);
+      for (int c = column; c < std::min(column + kLanes, columns_); ++c) {
+        // The wave itself and its mirror image, each where sampling folds it to.
+        const int k = c % width;
+        const int mirrored = (width - k) % width;
+        if (k <= width / 2) half[at(k)] += Complex(re[at(c - column)], im[at(c - column)]);
+        const bool mirrors = c > 0 && 2 * c < grid_.width;
+        if (mirrors && mirrored <= width / 2)
+          half[at(mirrored)] += Complex(re[at(c - column)], -im[at(c - column)]);
+      }
     }
     const auto line = std::span(line_real_[s]).first(at(width));
     lines_[s].inverse(std::span<const Complex>(half), line);
-    for (int lane = 0; lane < kLanes; ++lane) {
-      float* row = &samples_[at(four * kLanes + lane) * at(width)];
-      for (int x = 0; x < width; ++x) row[x] = line[at(x)].v[lane];
+    for (int x = 0; x < width; x += kLanes) {
+      Square square;
+      std::copy_n(&line[at(x)], kLanes, square.begin());
+      transpose(square);
+      for (int lane = 0; lane < kLanes; ++lane)
+        std::memcpy(&samples_[at(four * kLanes + lane) * at(width) + at(x)], &square[at(lane)].v,
+                    sizeof(Lanes::Vector));
     }
   });
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <span>
 #include <vector>
 
@@ -45,9 +46,11 @@ class Blur {
 
  private:
   using Complex = FourierLines::Complex;
+  using Square = std::array<Lanes, Lanes::kCount>;
 
   template <class Work>
   void share(int count, const Work& work) noexcept;
+  void load_rows(const RadianceImage& picture, int first, std::span<Lanes> line) noexcept;
   void transform_rows(const RadianceImage& picture) noexcept;
   void multiply_columns(int filled_from, int filled_to, const GridOtf& otf) noexcept;
   void fold_columns(double move_x, double move_y) noexcept;
@@ -61,6 +64,8 @@ class Blur {
   WorkerPool& pool_;
   Grid grid_;
   int columns_ = 0;  ///< of the half spectrum, up to the cutoff
+  /// Of each group of columns: frequencies from 0 on either way that it has, no more, with 0.
+  std::vector<std::size_t> passed_;
 
   std::vector<FourierLines> lines_;  ///< one a share of the work
   std::vector<std::vector<Complex>> line_in_;

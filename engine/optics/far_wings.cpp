@@ -5,7 +5,7 @@
 
 #include "engine/core/constants.h"
 #include "engine/core/contract.h"
-#include "engine/optics/lagrange.h"
+#include "engine/core/lagrange.h"
 
 namespace engine {
 namespace {
@@ -54,8 +54,8 @@ FarWings::FarWings(const WingLaw& law, double width, int longest_px, WorkerPool&
     table_[at(i)] = static_cast<float>(otf(static_cast<double>(i) / kTableSteps / kCell));
   const int longest = longest_px / kCell + kMoreCells;
   cells_.reserve(longest, longest);
-  // Of a picture of three cells to a pixel; the system hands out real memory for what is used.
-  lines_.reserve(at(3 * longest_px) * at(longest));
+  // Of the finest picture; the system hands out real memory for what is used.
+  lines_.reserve(at(kMostFine / kCell * longest_px) * at(longest));
 }
 
 RadialOtf FarWings::table() const noexcept { return {table_, 1.0 * kTableSteps * kCell}; }
@@ -85,35 +85,34 @@ void FarWings::gather(const RadianceImage& picture, const PixelRect& region,
   }
   const int first_x = (region.left - covered_.left * kCell) * oversampling;
   const int first_y = (region.top - covered_.top * kCell) * oversampling;
-  const std::size_t width = at(cells_.width());
-  if (lines_.size() < at(picture.height()) * width) lines_.resize(at(picture.height()) * width);
-  pool_.rows(0, picture.height(), [&](int y) {
-    const auto from = picture.row(y);
-    const auto line = std::span(lines_).subspan(at(y) * width, width);
-    std::ranges::fill(line, 0.0F);
-    for (int x = 0; x < picture.width();) {
-      const int cell = (first_x + x) / fine;
-      const int end = std::min(picture.width(), (cell + 1) * fine - first_x);
-      std::array<float, 3> sum{};
-      for (; x < end; ++x)
-        for (std::size_t i = 0; i < 3; ++i)
-          sum[i] += shares[at(first_x + x - cell * fine)][i] * from[at(x)];
-      for (std::size_t i = 0; i < 3; ++i) line[at(cell) + i - 1] += sum[i];
-    }
-  });
   // Of the radiance the mean over a cell: what a transform of cells is to be given.
   const auto mean = static_cast<float>(1.0 / (fine * fine));
+  const std::size_t length = at(picture.width());
+  const std::size_t needed = at(cells_.height()) * length;
+  if (lines_.size() < needed) lines_.resize(needed);
   pool_.rows(0, cells_.height(), [&](int row) {
-    const auto to = cells_.row(row);
-    std::ranges::fill(to, 0.0F);
+    // First down, for the picture's rows lie in one piece each.
+    const auto line = std::span(lines_).subspan(at(row) * length, length);
     const int begin = std::max((row - 1) * fine - first_y, 0);
     const int end = std::min((row + 2) * fine - first_y, picture.height());
+    std::ranges::fill(line, 0.0F);
     for (int y = begin; y < end; ++y) {
       const int cell = (first_y + y) / fine;
       const float share = mean * shares[at(first_y + y - cell * fine)][at(row - cell + 1)];
       if (share == 0.0F) continue;
-      const float* line = &lines_[at(y) * width];
-      for (std::size_t i = 0; i < width; ++i) to[i] += share * line[i];
+      const float* from = picture.row(y).data();
+      for (std::size_t x = 0; x < length; ++x) line[x] += share * from[x];
+    }
+    const auto to = cells_.row(row);
+    std::ranges::fill(to, 0.0F);
+    for (int x = 0; x < picture.width();) {
+      const int cell = (first_x + x) / fine;
+      const int next = std::min(picture.width(), (cell + 1) * fine - first_x);
+      std::array<float, 3> sum{};
+      for (; x < next; ++x)
+        for (std::size_t i = 0; i < 3; ++i)
+          sum[i] += shares[at(first_x + x - cell * fine)][i] * line[at(x)];
+      for (std::size_t i = 0; i < 3; ++i) to[at(cell) + i - 1] += sum[i];
     }
   });
 }

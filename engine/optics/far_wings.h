@@ -56,7 +56,7 @@ class FarWings {
   std::array<double, 2> strength_;  ///< of each law: 2 pi c / s
   std::vector<float> table_;
   RadianceImage cells_;
-  std::vector<float> lines_;  ///< [row of the picture][cell]
+  std::vector<float> lines_;  ///< [row of cells][column of the picture]
   PixelRect covered_;         ///< in cells from the detector's corner
   int margin_x_ = 0;
   int margin_y_ = 0;

@@ -30,6 +30,19 @@ struct Lanes {
   friend Lanes operator-(const Lanes& a) noexcept { return Lanes(-a.v); }
 };
 
+/// A square of numbers turned over: lane i of the k-th becomes lane k of the i-th.
+inline void transpose(Lanes& a, Lanes& b, Lanes& c, Lanes& d) noexcept {
+  static_assert(Lanes::kCount == 4);
+  const Lanes::Vector ab = __builtin_shufflevector(a.v, b.v, 0, 4, 1, 5);
+  const Lanes::Vector cd = __builtin_shufflevector(c.v, d.v, 0, 4, 1, 5);
+  const Lanes::Vector ab_high = __builtin_shufflevector(a.v, b.v, 2, 6, 3, 7);
+  const Lanes::Vector cd_high = __builtin_shufflevector(c.v, d.v, 2, 6, 3, 7);
+  a.v = __builtin_shufflevector(ab, cd, 0, 1, 4, 5);
+  b.v = __builtin_shufflevector(ab, cd, 2, 3, 6, 7);
+  c.v = __builtin_shufflevector(ab_high, cd_high, 0, 1, 4, 5);
+  d.v = __builtin_shufflevector(ab_high, cd_high, 2, 3, 6, 7);
+}
+
 /// Transforms of kCount lines at once in single precision, unscaled. Eigen's kissfft, which counts
 /// with any type of number: permissive, no plan that a clock chooses, so the same bits every time.
 /// Thread: one at a time. Loop-safe for the lengths named in the constructor.

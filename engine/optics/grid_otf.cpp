@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "engine/core/constants.h"
 #include "engine/optics/mtf.h"
@@ -62,17 +63,13 @@ void GridOtf::prepare_rows(int height, const ImageMotion& motion) noexcept {
   }
 }
 
-GridOtf::Complex GridOtf::unmoved(const Lanes& fu, float fv) const noexcept {
+GridOtf::Complex GridOtf::directed(const Lanes& fu, float fv) const noexcept {
   Lanes re;
   Lanes im;
   for (int c = 0; c < Lanes::kCount; ++c) {
-    const float f = std::sqrt(fu.v[c] * fu.v[c] + fv * fv);
-    if (!directed_) {
-      re.v[c] = radial_.at(f);
-      continue;
-    }
     const auto value = directed_->cascade.at(static_cast<double>(fu.v[c]), static_cast<double>(fv),
                                              directed_->lens);
+    const float f = std::sqrt(fu.v[c] * fu.v[c] + fv * fv);
     const float less = directed_->less.table.empty() ? 0.0F : directed_->less.at(f);
     re.v[c] = static_cast<float>(value.real()) - less;
     im.v[c] = static_cast<float>(value.imag());
@@ -80,7 +77,39 @@ GridOtf::Complex GridOtf::unmoved(const Lanes& fu, float fv) const noexcept {
   return {re, im};
 }
 
-void GridOtf::fill_column(const Lanes& fx, std::span<Complex> out) const noexcept {
+/// The circle of the cutoff, and one more for rounding.
+std::size_t GridOtf::passed(float per_px, std::size_t height) const noexcept {
+  const auto f = static_cast<double>(per_px);
+  const double most = std::sqrt(std::max(cutoff_per_px_ * cutoff_per_px_ - f * f, 0.0));
+  const double waves = most * cell_px_ * static_cast<double>(height);
+  return std::min(height / 2 + 1, static_cast<std::size_t>(waves) + 2);
+}
+
+/// A table is looked up number by number: a block of them first, then all their lanes at once.
+void GridOtf::fill_radial(const Lanes& per_px, const Lanes& pixel,
+                          std::span<Complex> out) const noexcept {
+  constexpr std::size_t kBlock = 32;
+  constexpr std::size_t kLanes = Lanes::kCount;
+  std::array<float, kLanes> across2;
+  for (std::size_t c = 0; c < kLanes; ++c) across2[c] = per_px.v[c] * per_px.v[c];
+  const RadialOtf radial = radial_;
+  std::array<float, kBlock * kLanes> otf;
+  for (std::size_t first = 0; first < out.size(); first += kBlock) {
+    const std::size_t count = std::min(kBlock, out.size() - first);
+    for (std::size_t k = 0; k < count; ++k) {
+      const float down = rows_[first + k].per_px;
+      for (std::size_t c = 0; c < kLanes; ++c)
+        otf[k * kLanes + c] = radial.at(std::sqrt(across2[c] + down * down));
+    }
+    for (std::size_t k = 0; k < count; ++k) {
+      Lanes value;
+      std::memcpy(&value.v, &otf[k * kLanes], sizeof value.v);
+      out[first + k] = Complex(value * pixel * Lanes(rows_[first + k].pixel), Lanes{});
+    }
+  }
+}
+
+std::size_t GridOtf::fill_column(const Lanes& fx, std::span<Complex> out) const noexcept {
   Lanes per_px;
   Lanes pixel;
   for (int c = 0; c < Lanes::kCount; ++c) {
@@ -89,21 +118,27 @@ void GridOtf::fill_column(const Lanes& fx, std::span<Complex> out) const noexcep
     pixel.v[c] = static_cast<float>(pixel_factor(f));
   }
   const std::size_t height = out.size();
-  for (std::size_t k = 0; k < height; ++k) {
-    const Row& row = rows_[k];
-    // A radial OTF is the same above and below.
-    const std::size_t mirrored = height - k;
-    out[k] = directed_ || mirrored >= k ? unmoved(per_px, row.per_px) : out[mirrored];
-  }
-  for (std::size_t k = 0; k < height; ++k) out[k] *= pixel * Lanes(rows_[k].pixel);
-  if (motion_.path.bends) {
-    follow_path(per_px, out);
-  } else if (smears_) {
-    smear_column(per_px, out);
-  }
+  const std::size_t above = passed(per_px.v[0], height);
+  const std::size_t below = std::max(above, height + 1 - above);
+  if (!directed_) fill_radial(per_px, pixel, out.first(above));
+  const auto fill = [&](std::size_t from, std::size_t to) {
+    for (std::size_t k = from; directed_ && k < to; ++k)
+      out[k] = directed(per_px, rows_[k].per_px) * (pixel * Lanes(rows_[k].pixel));
+    if (motion_.path.bends) {
+      follow_path(per_px, out, from, to);
+    } else if (smears_) {
+      smear(per_px, out, from, to);
+    }
+  };
+  // A radial OTF is the same above and below, but for its motion.
+  for (std::size_t k = below; !directed_ && k < height; ++k) out[k] = out[height - k];
+  fill(0, above);
+  fill(below, height);
+  return above;
 }
 
-void GridOtf::smear_column(const Lanes& per_px, std::span<Complex> out) const noexcept {
+void GridOtf::smear(const Lanes& per_px, std::span<Complex> out, std::size_t from,
+                    std::size_t to) const noexcept {
   Lanes turns;
   Lanes sine;
   Lanes cosine;
@@ -113,7 +148,7 @@ void GridOtf::smear_column(const Lanes& per_px, std::span<Complex> out) const no
     sine.v[c] = static_cast<float>(std::sin(kPi * t));
     cosine.v[c] = static_cast<float>(std::cos(kPi * t));
   }
-  for (std::size_t k = 0; k < out.size(); ++k) {
+  for (std::size_t k = from; k < to; ++k) {
     const Row& row = rows_[k];
     const Lanes x = turns + Lanes(row.smear);
     const Lanes wave = sine * Lanes(row.cosine) + cosine * Lanes(row.sine);
@@ -127,7 +162,8 @@ void GridOtf::smear_column(const Lanes& per_px, std::span<Complex> out) const no
 
 /// The mean of a wave over a straight step is the difference of its ends over the phase between
 /// them: what the waves are at the knots is all that is needed.
-void GridOtf::follow_path(const Lanes& per_px, std::span<Complex> out) const noexcept {
+void GridOtf::follow_path(const Lanes& per_px, std::span<Complex> out, std::size_t from,
+                          std::size_t to) const noexcept {
   constexpr auto kSteps = static_cast<std::size_t>(ImagePath::kSteps);
   std::array<Complex, kKnots> column;
   std::array<PixelPoint, kSteps> steps;
@@ -143,11 +179,8 @@ void GridOtf::follow_path(const Lanes& per_px, std::span<Complex> out) const noe
     column[i] = Complex(re, im);
     if (i < kSteps) steps[i] = motion_.step_px(static_cast<int>(i));
   }
-  const float near_px = per_px.v[0];
-  const auto cutoff = static_cast<float>(cutoff_per_px_);
-  for (std::size_t k = 0; k < out.size(); ++k) {
+  for (std::size_t k = from; k < to; ++k) {
     const Row& row = rows_[k];
-    if (row.per_px * row.per_px + near_px * near_px > cutoff * cutoff) continue;
     const Waves& waves = row_waves_[k];
     const auto at_knot = [&](std::size_t i) {
       const Lanes a(waves[i].real());

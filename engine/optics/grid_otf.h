@@ -58,9 +58,10 @@ class GridOtf {
 
   /// Cycles per cell beyond which it is 0.
   [[nodiscard]] double cutoff() const noexcept { return cutoff_per_px_ * cell_px_; }
-  /// At horizontal frequencies `fx`, in cycles per cell, and at the vertical ones k / height, for
-  /// k from 0 on; from half the height on, that less 1.
-  void fill_column(const Lanes& fx, std::span<Complex> out) const noexcept;
+  /// At horizontal frequencies `fx` >= 0, in cycles per cell, the least first, and at the vertical
+  /// ones k / height, for k from 0 on; from half the height on, that less 1. Returns for how many
+  /// from 0 on, and as many from 0 down, there is anything: the others are not written.
+  [[nodiscard]] std::size_t fill_column(const Lanes& fx, std::span<Complex> out) const noexcept;
 
  private:
   /// What depends on the vertical frequency alone.
@@ -77,9 +78,13 @@ class GridOtf {
   using Waves = std::array<std::complex<float>, kKnots>;
 
   void prepare_rows(int height, const ImageMotion& motion) noexcept;
-  [[nodiscard]] Complex unmoved(const Lanes& fu, float fv) const noexcept;
-  void smear_column(const Lanes& per_px, std::span<Complex> out) const noexcept;
-  void follow_path(const Lanes& per_px, std::span<Complex> out) const noexcept;
+  [[nodiscard]] std::size_t passed(float per_px, std::size_t height) const noexcept;
+  [[nodiscard]] Complex directed(const Lanes& fu, float fv) const noexcept;
+  void fill_radial(const Lanes& per_px, const Lanes& pixel, std::span<Complex> out) const noexcept;
+  void smear(const Lanes& per_px, std::span<Complex> out, std::size_t from,
+             std::size_t to) const noexcept;
+  void follow_path(const Lanes& per_px, std::span<Complex> out, std::size_t from,
+                   std::size_t to) const noexcept;
 
   double cell_px_;
   int averages_;

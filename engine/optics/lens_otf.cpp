@@ -5,7 +5,7 @@
 
 #include "engine/core/constants.h"
 #include "engine/core/contract.h"
-#include "engine/optics/lagrange.h"
+#include "engine/core/lagrange.h"
 #include "engine/optics/mtf.h"
 #include "engine/optics/pupil_grid.h"
 

@@ -226,35 +226,53 @@ Optics::Survey Optics::survey(const RadianceImage& light) noexcept {
   const auto limit =
       static_cast<float>(kBright * faint_w_m2_ * oversampling_ * oversampling_ / throughput_sr_);
   rows_.resize(at(light.height()));
-  pool_.rows(0, light.height(), [&](int y) {
-    constexpr std::size_t kSums = 8;  // side by side, for the processor has room for them
-    std::array<float, kSums> most{};
-    std::array<float, kSums> most_dim{};
-    std::array<double, kSums> sum{};
-    std::array<int, kSums> bright{};
-    std::array<int, kSums> broken{};
-    const auto cells = light.row(y);
-    for (std::size_t first = 0; first < cells.size(); first += kSums) {
-      const std::size_t count = std::min(kSums, cells.size() - first);
-      for (std::size_t k = 0; k < count; ++k) {
-        const float here = std::abs(cells[first + k]);
-        const bool finite = here <= std::numeric_limits<float>::max();
-        const float counts = finite ? here : 0.0F;
-        sum[k] += static_cast<double>(counts);
-        broken[k] += finite ? 0 : 1;
-        bright[k] += counts > limit ? 1 : 0;
-        most[k] = std::max(most[k], counts);
-        most_dim[k] = std::max(most_dim[k], counts > limit ? 0.0F : counts);
-      }
-    }
-    Survey& row = rows_[at(y)] = {};
-    for (std::size_t k = 0; k < kSums; ++k)
-      row.add({sum[k], most[k], most_dim[k], bright[k], broken[k]});
-  });
+  pool_.rows(0, light.height(), [&](int y) { rows_[at(y)] = survey_row(light.row(y), limit); });
   Survey all;
   for (const Survey& row : rows_) all.add(row);
   all.bright_limit = limit;
   return all;
+}
+
+Optics::Survey Optics::survey_row(std::span<const float> cells, float bright_limit) noexcept {
+  constexpr std::size_t kSums = 16;  // side by side, for the processor has room for them
+  std::array<float, kSums> most{};
+  std::array<float, kSums> sum{};
+  const std::size_t blocks = cells.size() / kSums * kSums;
+  for (std::size_t first = 0; first < blocks; first += kSums) {
+    for (std::size_t k = 0; k < kSums; ++k) {
+      const float here = std::abs(cells[first + k]);
+      sum[k] += here;
+      most[k] = most[k] > here ? most[k] : here;
+    }
+  }
+  Survey row;
+  for (std::size_t k = 0; k < kSums; ++k) {
+    row.sum += static_cast<double>(sum[k]);
+    row.most = std::max(row.most, most[k]);
+  }
+  for (const float cell : cells.subspan(blocks)) {
+    row.sum += static_cast<double>(std::abs(cell));
+    row.most = std::max(row.most, std::abs(cell));
+  }
+  row.most_dim = row.most;
+  // Mostly that is all. What is no number has shown in the sum.
+  if (std::isfinite(row.sum) && row.most <= bright_limit) return row;
+  row = {};
+  for (const float cell : cells) {
+    const float here = std::abs(cell);
+    if (!std::isfinite(here)) {
+      ++row.broken;
+      continue;
+    }
+    row.sum += static_cast<double>(here);
+    row.most = std::max(row.most, here);
+    if (here > bright_limit) {
+      ++row.bright;
+    } else {
+      row.most_dim = std::max(row.most_dim, here);
+    }
+  }
+  return row;
 }
 
 /// The grid less what it hides of the Earth.

@@ -111,6 +111,7 @@ class Optics {
   void fill_background(const Radiance& in, IrradianceImage& out) noexcept;
   const RadianceImage& net_light(const Radiance& in) noexcept;
   Survey survey(const RadianceImage& light) noexcept;
+  [[nodiscard]] static Survey survey_row(std::span<const float> cells, float bright_limit) noexcept;
   RadianceImage& own(const RadianceImage& light) noexcept;
   const RadianceImage& without_broken(const RadianceImage& light, const Survey& found) noexcept;
   const RadianceImage& take_bright_cells(const Radiance& in, const RadianceImage& light,

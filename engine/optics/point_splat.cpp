@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "engine/core/constants.h"
-#include "engine/optics/lagrange.h"
+#include "engine/core/lagrange.h"
 #include "engine/optics/mtf.h"
 #include "engine/optics/point_image.h"
 
