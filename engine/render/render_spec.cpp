@@ -6,6 +6,7 @@
 #include "engine/core/contract.h"
 #include "engine/render/bounce_depth.h"
 #include "engine/render/bounced_light.h"
+#include "engine/render/curved_renderer.h"
 #include "engine/render/far_target.h"
 #include "engine/render/lattice_renderer.h"
 #include "engine/render/mesh_levels.h"
@@ -93,8 +94,11 @@ std::unique_ptr<Renderer> make_renderer(
     resolved = std::make_unique<LevelledRenderer>(settled, *target, std::move(levels));
   }
   // Bodies that may hide and shade each other have no light as a whole.
-  if (settled.far_target == FarTargetForm::kResolved || !companions.empty()) return resolved;
-  return std::make_unique<FarTarget>(settled, std::move(resolved), std::move(target), pool);
+  const bool as_a_whole = settled.far_target != FarTargetForm::kResolved && companions.empty();
+  if (as_a_whole)
+    resolved = std::make_unique<FarTarget>(settled, std::move(resolved), std::move(target), pool);
+  if (settled.camera.distortion.none()) return resolved;
+  return std::make_unique<CurvedRenderer>(settled.camera, settled.grid, std::move(resolved), pool);
 }
 
 }  // namespace engine

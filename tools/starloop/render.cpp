@@ -60,22 +60,6 @@ std::vector<engine::FitsCard> header_of(const Scenario& s, double time_s,
   };
 }
 
-/// By how much the target's image, whose distortion is affine about its centre, is off at the
-/// furthest corner of its box.
-double distortion_left_px(const engine::CameraGeometry& camera, const engine::FrameTruth& truth) {
-  const auto map = camera.map_near(camera.direction_at(truth.target_px), {}, 1.0);
-  if (!map || truth.box.empty()) return 0.0;
-  const engine::LocalCamera local(camera, *map);
-  double most = 0;
-  for (const int u : {truth.box.left, truth.box.right}) {
-    for (const int v : {truth.box.top, truth.box.bottom}) {
-      const auto seen = local.project(camera.direction_at({1.0 * u, 1.0 * v}));
-      if (seen) most = std::max(most, std::hypot(seen->u - u, seen->v - v));
-    }
-  }
-  return most;
-}
-
 /// What a person wants to know of it.
 void tell(const std::string& fits, const std::string& png, const Scenario& scenario,
           const std::string& star_text, const engine::FrameReport& report) {
@@ -106,9 +90,6 @@ void tell(const std::string& fits, const std::string& png, const Scenario& scena
         "optics: light followed for %d px, on the fine grid %d; %.2f %% of a point's beyond; "
         "the target %.0f nm of path out of focus\n",
         optics.wing_px, optics.core_px, 100.0 * optics.lost_flux_share, optics.defocus_m * 1e9);
-  if (!scenario.scene.camera.distortion.none())
-    std::printf("distortion: affine about the target, at its edge off by %.3f px at most\n",
-                distortion_left_px(scenario.scene.camera, t));
   for (const hil::JitterLine& line : scenario.slow_vibration.lines)
     std::printf("vibration: %.2f periods to an exposure, so followed as a path\n",
                 line.frequency_hz * engine::seconds(scenario.run.exposure));
