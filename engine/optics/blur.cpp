@@ -76,14 +76,30 @@ void Blur::share(int count, const Work& work) noexcept {
 }
 
 void Blur::transform(const RadianceImage& picture, const Grid& grid, const GridOtf& otf) noexcept {
-  const int rows = (picture.height() + Lanes::kCount - 1) / Lanes::kCount * Lanes::kCount;
-  ENSURE(grid.width <= longest_ && grid.height <= longest_);
-  ENSURE(grid.left >= 0 && grid.left + picture.width() <= grid.width);
-  ENSURE(grid.top >= 0 && grid.top + rows <= grid.height);
-  grid_ = grid;
-  columns_ = std::min(grid.width / 2, static_cast<int>(otf.cutoff() * grid.width)) + 1;
-  transform_rows(picture);
-  multiply_columns(grid.top, grid.top + rows, otf);
+  transform_rows(picture, grid, otf);
+  share(groups(), [&](std::size_t s, int g) {
+    const auto waves = multiply_columns(s, g, otf);
+    Complex* line = &spectrum_[at(g) * waves.size()];
+    each_passed(passed_[at(g)], waves.size(), [&](std::size_t from, std::size_t to) {
+      std::copy(&waves[from], &waves[to], &line[from]);
+    });
+  });
+}
+
+void Blur::sample(double move_x, double move_y) noexcept {
+  prepare_move(move_x, move_y);
+  share(groups(), [&](std::size_t s, int g) {
+    fold_columns(s, g, std::span(spectrum_).subspan(at(g) * at(grid_.height), at(grid_.height)));
+  });
+  sample_rows();
+}
+
+void Blur::transform_and_sample(const RadianceImage& picture, const Grid& grid, const GridOtf& otf,
+                                double move_x, double move_y) noexcept {
+  transform_rows(picture, grid, otf);
+  prepare_move(move_x, move_y);
+  share(groups(), [&](std::size_t s, int g) { fold_columns(s, g, multiply_columns(s, g, otf)); });
+  sample_rows();
 }
 
 /// Four rows side by side; those below the picture are dark.
@@ -107,8 +123,15 @@ void Blur::load_rows(const RadianceImage& picture, int first, std::span<Lanes> l
   }
 }
 
-void Blur::transform_rows(const RadianceImage& picture) noexcept {
+void Blur::transform_rows(const RadianceImage& picture, const Grid& grid,
+                          const GridOtf& otf) noexcept {
   constexpr int kLanes = Lanes::kCount;
+  filled_ = (picture.height() + kLanes - 1) / kLanes * kLanes;
+  ENSURE(grid.width <= longest_ && grid.height <= longest_);
+  ENSURE(grid.left >= 0 && grid.left + picture.width() <= grid.width);
+  ENSURE(grid.top >= 0 && grid.top + filled_ <= grid.height);
+  grid_ = grid;
+  columns_ = std::min(grid.width / 2, static_cast<int>(otf.cutoff() * grid.width)) + 1;
   share((picture.height() + kLanes - 1) / kLanes, [&](std::size_t s, int four) {
     const auto line = std::span(line_real_[s]).first(at(grid_.width));
     load_rows(picture, four * kLanes, line);
@@ -133,58 +156,54 @@ void Blur::transform_rows(const RadianceImage& picture) noexcept {
   });
 }
 
-void Blur::multiply_columns(int filled_from, int filled_to, const GridOtf& otf) noexcept {
-  share(groups(), [&](std::size_t s, int g) {
-    const auto line = std::span(spectrum_).subspan(at(g) * at(grid_.height), at(grid_.height));
-    std::ranges::fill(line.first(at(filled_from)), Complex{});
-    std::ranges::fill(line.subspan(at(filled_to)), Complex{});
-    const auto waves = std::span(line_out_[s]).first(line.size());
-    lines_[s].forward(std::span<const Complex>(line), waves);
-    Lanes fx;
-    for (int c = 0; c < Lanes::kCount; ++c)
-      fx.v[c] = static_cast<float>(static_cast<double>(g * Lanes::kCount + c) / grid_.width);
-    const auto factors = std::span(line_in_[s]).first(line.size());
-    passed_[at(g)] = otf.fill_column(fx, factors);
-    each_passed(passed_[at(g)], line.size(), [&](std::size_t from, std::size_t to) {
-      for (std::size_t k = from; k < to; ++k) line[k] = waves[k] * factors[k];
-    });
+/// The product of four columns' waves and the transfer function; only what passes is one.
+std::span<const Blur::Complex> Blur::multiply_columns(std::size_t s, int g,
+                                                      const GridOtf& otf) noexcept {
+  const auto line = std::span(spectrum_).subspan(at(g) * at(grid_.height), at(grid_.height));
+  std::ranges::fill(line.first(at(grid_.top)), Complex{});
+  std::ranges::fill(line.subspan(at(grid_.top + filled_)), Complex{});
+  const auto waves = std::span(line_out_[s]).first(line.size());
+  lines_[s].forward(std::span<const Complex>(line), waves);
+  Lanes fx;
+  for (int c = 0; c < Lanes::kCount; ++c)
+    fx.v[c] = static_cast<float>(static_cast<double>(g * Lanes::kCount + c) / grid_.width);
+  const auto factors = std::span(line_in_[s]).first(line.size());
+  passed_[at(g)] = otf.fill_column(fx, factors);
+  each_passed(passed_[at(g)], line.size(), [&](std::size_t from, std::size_t to) {
+    for (std::size_t k = from; k < to; ++k) waves[k] *= factors[k];
   });
+  return waves;
 }
 
-void Blur::sample(double move_x, double move_y) noexcept {
-  const bool moves = move_x != 0.0 || move_y != 0.0;
-  for (int k = 0; moves && k < grid_.height; ++k) {
+void Blur::prepare_move(double move_x, double move_y) noexcept {
+  move_x_ = move_x;
+  moves_ = move_x != 0.0 || move_y != 0.0;
+  for (int k = 0; moves_ && k < grid_.height; ++k) {
     const int wave = k <= grid_.height / 2 ? k : k - grid_.height;
     turned_[at(k)] = phase_of(static_cast<double>(wave) / grid_.height * move_y);
   }
-  fold_columns(move_x, move_y);
-  sample_rows();
 }
 
-void Blur::fold_columns(double move_x, double move_y) noexcept {
+void Blur::fold_columns(std::size_t s, int g, std::span<const Complex> line) noexcept {
   const std::size_t samples = at(samples_y());
-  const bool moves = move_x != 0.0 || move_y != 0.0;
-  share(groups(), [&](std::size_t s, int g) {
-    const Complex* line = &spectrum_[at(g) * at(grid_.height)];
-    const auto sum = std::span(line_in_[s]).first(samples);
-    Lanes re;
-    Lanes im;
-    for (int c = 0; moves && c < Lanes::kCount; ++c) {
-      const auto turned =
-          phase_of(static_cast<double>(g * Lanes::kCount + c) / grid_.width * move_x);
-      re.v[c] = turned.real();
-      im.v[c] = turned.imag();
-    }
-    std::ranges::fill(sum, Complex{});
-    each_passed(passed_[at(g)], at(grid_.height), [&](std::size_t from, std::size_t to) {
-      std::size_t j = from % samples;
-      for (std::size_t k = from; k < to; ++k, j = j + 1 < samples ? j + 1 : 0)
-        sum[j] += moves ? line[k] * Complex(re, im) * Complex(turned_[k].real(), turned_[k].imag())
-                        : line[k];
-    });
-    lines_[s].inverse(std::span<const Complex>(sum),
-                      std::span(folded_).subspan(at(g) * samples, samples));
+  const auto sum = std::span(line_in_[s]).first(samples);
+  Lanes re;
+  Lanes im;
+  for (int c = 0; moves_ && c < Lanes::kCount; ++c) {
+    const auto turned =
+        phase_of(static_cast<double>(g * Lanes::kCount + c) / grid_.width * move_x_);
+    re.v[c] = turned.real();
+    im.v[c] = turned.imag();
+  }
+  std::ranges::fill(sum, Complex{});
+  each_passed(passed_[at(g)], line.size(), [&](std::size_t from, std::size_t to) {
+    std::size_t j = from % samples;
+    for (std::size_t k = from; k < to; ++k, j = j + 1 < samples ? j + 1 : 0)
+      sum[j] += moves_ ? line[k] * Complex(re, im) * Complex(turned_[k].real(), turned_[k].imag())
+                       : line[k];
   });
+  lines_[s].inverse(std::span<const Complex>(sum),
+                    std::span(folded_).subspan(at(g) * samples, samples));
 }
 
 void Blur::sample_rows() noexcept {

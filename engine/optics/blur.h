@@ -36,6 +36,9 @@ class Blur {
   /// The blurred picture, moved right and down by so many cells; cell 0 is the first sample.
   /// Callable again for the same transform.
   void sample(double move_x, double move_y) noexcept;
+  /// Both, for who wants one sample: what lies between is not kept.
+  void transform_and_sample(const RadianceImage& picture, const Grid& grid, const GridOtf& otf,
+                            double move_x, double move_y) noexcept;
   /// Of what was last sampled, times the number of cells of the grid.
   [[nodiscard]] std::span<const float> row(int y) const noexcept;
   [[nodiscard]] int samples_x() const noexcept { return grid_.width / step_; }
@@ -51,9 +54,11 @@ class Blur {
   template <class Work>
   void share(int count, const Work& work) noexcept;
   void load_rows(const RadianceImage& picture, int first, std::span<Lanes> line) noexcept;
-  void transform_rows(const RadianceImage& picture) noexcept;
-  void multiply_columns(int filled_from, int filled_to, const GridOtf& otf) noexcept;
-  void fold_columns(double move_x, double move_y) noexcept;
+  void transform_rows(const RadianceImage& picture, const Grid& grid, const GridOtf& otf) noexcept;
+  [[nodiscard]] std::span<const Complex> multiply_columns(std::size_t s, int g,
+                                                          const GridOtf& otf) noexcept;
+  void prepare_move(double move_x, double move_y) noexcept;
+  void fold_columns(std::size_t s, int g, std::span<const Complex> line) noexcept;
   void sample_rows() noexcept;
   [[nodiscard]] int groups() const noexcept {
     return (columns_ + Lanes::kCount - 1) / Lanes::kCount;
@@ -63,6 +68,7 @@ class Blur {
   int longest_ = 0;  ///< side of a grid, in cells
   WorkerPool& pool_;
   Grid grid_;
+  int filled_ = 0;   ///< rows from grid_.top on that may have light, in fours
   int columns_ = 0;  ///< of the half spectrum, up to the cutoff
   /// Of each group of columns: frequencies from 0 on either way that it has, no more, with 0.
   std::vector<std::size_t> passed_;
@@ -72,8 +78,10 @@ class Blur {
   std::vector<std::vector<Complex>> line_out_;
   std::vector<std::vector<Lanes>> line_real_;
   // The system hands out real memory only for what a frame uses.
-  std::vector<Complex> spectrum_;            ///< [group of columns][row frequency]
-  std::vector<Complex> folded_;              ///< [group of columns][sampled row]
+  std::vector<Complex> spectrum_;  ///< [group of columns][row frequency]
+  std::vector<Complex> folded_;    ///< [group of columns][sampled row]
+  bool moves_ = false;             ///< the sample that is being taken
+  double move_x_ = 0;
   std::vector<std::complex<float>> turned_;  ///< what a move does to each row frequency
   std::vector<float> samples_;
 };

@@ -382,18 +382,28 @@ void Optics::spread_grid(const RadianceImage& light, const PixelRect& region, co
     core_otf_.prepare(DirectedOtf{cascade_, focused_, with_wings ? wings_.table() : RadialOtf{}},
                       grid.height, stroke.motion);
   }
-  core_.transform(light, grid, core_otf_);
+  const bool once = stroke.pieces == 1;
+  if (!once) core_.transform(light, grid, core_otf_);
+  const auto sample = [&](double move_x, double move_y) {
+    if (once) {
+      core_.transform_and_sample(light, grid, core_otf_, move_x, move_y);
+    } else {
+      core_.sample(move_x, move_y);
+    }
+  };
   if (with_wings) wings_.transform(report.wing_px, stroke.motion);
   report.segments += stroke.pieces;
   for (int i = 0; i < stroke.pieces; ++i) {
     const double share = stroke.share / stroke.pieces;
-    add_core(grid_px, stroke.centre_px(i), share, out);
+    add_core(grid_px, stroke.centre_px(i), share, sample, out);
     if (with_wings) wings_.add(stroke.centre_px(i), throughput_sr_ * share, out);
   }
 }
 
+/// What sample(move_x, move_y) makes of the light, in cells.
+template <class Sample>
 void Optics::add_core(const PixelRect& grid_px, PixelPoint move_px, double share,
-                      IrradianceImage& out) noexcept {
+                      const Sample& sample, IrradianceImage& out) noexcept {
   // Whole pixels move by moving the window, the rest by turning the waves.
   const double whole_u = std::round(move_px.u);
   const double whole_v = std::round(move_px.v);
@@ -404,8 +414,8 @@ void Optics::add_core(const PixelRect& grid_px, PixelPoint move_px, double share
           spec_.camera.frame());
   if (seen.empty()) return;
   const double to_centre = oversampling_ % 2 == 0 ? 0.5 : 0.0;
-  core_.sample(oversampling_ * (move_px.u - whole_u) - to_centre,
-               oversampling_ * (move_px.v - whole_v) - to_centre);
+  sample(oversampling_ * (move_px.u - whole_u) - to_centre,
+         oversampling_ * (move_px.v - whole_v) - to_centre);
   const auto scale = static_cast<float>(throughput_sr_ * core_.scale() * share);
   pool_.rows(seen.top, seen.bottom, [&](int v) {
     const auto from = core_.row(v - top).subspan(at(seen.left - left));

@@ -123,7 +123,8 @@ class Optics {
   void spread_grid(const RadianceImage& light, const PixelRect& region, const Survey& found,
                    int blur_px, const Stroke& stroke, OpticsReport& report,
                    IrradianceImage& out) noexcept;
-  void add_core(const PixelRect& grid_px, PixelPoint move_px, double share,
+  template <class Sample>
+  void add_core(const PixelRect& grid_px, PixelPoint move_px, double share, const Sample& sample,
                 IrradianceImage& out) noexcept;
 
   OpticsSpec spec_;
