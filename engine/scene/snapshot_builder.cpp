@@ -86,8 +86,8 @@ EarthshineChoice SnapshotBuilder::light_up(const SightLine& line, const BodyAxes
   const Direction<J2000> to_sun = direction_of<J2000>(to_sun_m);
   const double irradiance = sun_irradiance_w_m2(spec_.sun, to_sun_m.norm());
 
-  const bool lit = shadow_margin_m(line.target.position, sun) > 0.0;
-  out.sun = {axes * to_sun, lit ? irradiance : 0.0};
+  const double lit = lit_fraction(spec_.shadow, line.target.position, sun);
+  out.sun = {axes * to_sun, lit * irradiance};
   out.phase_angle_rad = angle_between_rad(to_sun.unit, -line.toward_target.unit);
   return light_by_earth(line, axes, sun, out);
 }

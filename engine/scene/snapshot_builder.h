@@ -6,6 +6,7 @@
 #include "engine/core/contract.h"
 #include "engine/orbit/attitude.h"
 #include "engine/orbit/propagator.h"
+#include "engine/orbit/shadow.h"
 #include "engine/orbit/sight_line.h"
 #include "engine/orbit/sun.h"
 #include "engine/scene/camera_geometry.h"
@@ -20,6 +21,7 @@ struct SceneSpec {
   std::uint64_t seed = 1;
   LightPath light_path = LightPath::kApparent;
   SunSpec sun;
+  ShadowModel shadow = ShadowModel::kOblateCone;  ///< the Earth's, on all bodies
   EarthSpec earth;
   EarthshineSensor earthshine_sensor;  ///< for EarthshineModel::kAuto
   EulerOffsets target_offsets;

@@ -234,41 +234,5 @@ TEST(Background, IsSpaceWhenTheCameraLooksAwayFromTheEarth) {
   EXPECT_TRUE(earth_is_behind({{8e6, 0, 0}}, {{7e6, 0, 0}}));
 }
 
-TEST(Shadow, IsTheCylinderOfTable2) {
-  const Position<J2000> sun{{kAstronomicalUnit_m, 0, 0}};
-  std::mt19937_64 random(2);
-  std::uniform_real_distribution<double> along(-5e7, 5e7);
-  for (int i = 0; i < 100000; ++i) {
-    const Vector3d body(along(random), 0.3 * along(random), 0.3 * along(random));
-    if (body.norm() < kEarthRadius_m + 1e3) continue;
-    const double gamma = angle_between_rad(body, sun.m);
-    const double off_axis_m = body.norm() * std::sin(gamma);
-    if (std::abs(off_axis_m - kEarthRadius_m) < 1.0) continue;
-    const bool lit = gamma <= kPi / 2.0 || off_axis_m > kEarthRadius_m;
-    ASSERT_EQ(shadow_margin_m({body}, sun) > 0.0, lit) << body.transpose();
-  }
-}
-
-TEST(Shadow, BeginsAndEndsAtTheGoldenTimes) {
-  const Flyby flyby;
-  const double lon = 240.0 * kDegree;
-  const double obliquity = 23.44 * kDegree;
-  const Position<J2000> sun{kAstronomicalUnit_m * Vector3d(std::cos(lon),
-                                                           std::sin(lon) * std::cos(obliquity),
-                                                           std::sin(lon) * std::sin(obliquity))};
-  const auto margin_m = [&](const Propagator& body, double t_s) {
-    return shadow_margin_m(body.at(flyby.at(t_s)).position, sun);
-  };
-  // Two decimals are printed.
-  EXPECT_GT(margin_m(flyby.camera, 1941.36 - 0.006), 0.0);
-  EXPECT_LT(margin_m(flyby.camera, 1941.36 + 0.006), 0.0);
-  EXPECT_LT(margin_m(flyby.camera, 3953.90 - 0.006), 0.0);
-  EXPECT_GT(margin_m(flyby.camera, 3953.90 + 0.006), 0.0);
-  EXPECT_GT(margin_m(flyby.target, 2970.86 - 0.006), 0.0);
-  EXPECT_LT(margin_m(flyby.target, 2970.86 + 0.006), 0.0);
-  EXPECT_LT(margin_m(flyby.target, 5132.89 - 0.006), 0.0);
-  EXPECT_GT(margin_m(flyby.target, 5132.89 + 0.006), 0.0);
-}
-
 }  // namespace
 }  // namespace engine
