@@ -1,24 +1,47 @@
 #pragma once
 
+#include <optional>
 #include <string_view>
-#include <vector>
 
 #include "engine/core/config_reader.h"
 #include "engine/orbit/propagator.h"
+#include "engine/orbit/shadow.h"
+#include "engine/orbit/signal_limit.h"
 #include "engine/orbit/sun.h"
 
 namespace engine {
 
-/// The conditions of table 2 of Li et al. 2023, and the ends of the search.
-enum class Condition : std::uint8_t { kRange, kLineOfSight, kEclipse, kSunExclusion, kSpan };
+/// What lets a camera see a target, or not: the conditions of table 2 of Li et al. 2023.
+enum class Condition : std::uint8_t {
+  kRange,
+  kLineOfSight,
+  kEclipse,
+  kSunExclusion,
+  kField,        ///< of a camera that looks at one place in the sky
+  kSignal,       ///< to noise
+  kEarthBehind,  ///< not needed to see it; where it holds the frame's background is the Earth
+  kSpan,         ///< the ends of the search
+};
+inline constexpr std::size_t kConditions = 7;  ///< without kSpan
 [[nodiscard]] std::string_view name_of(Condition condition) noexcept;
+
+/// What a camera at rest among the stars sees: directions by x/z and y/z. Without distortion.
+struct FieldOfView {
+  Rotation<CameraFrame, J2000> axes;
+  double left_tan = 0, right_tan = 0;
+  double top_tan = 0, bottom_tan = 0;
+};
 
 struct VisibilitySpec {
   double max_range_m = 300e3;
   double line_of_sight_height_m = 0;  ///< the line must clear the Earth by this
   double sun_exclusion_rad = 0;       ///< between the line of sight and the Sun's centre
   SunModel sun = SunModel::kErfa;
+  ShadowModel shadow = ShadowModel::kOblateCone;  ///< lit: any of the Sun is seen
+  std::optional<FieldOfView> field;               ///< nothing: the camera follows the target
+  std::optional<SignalLimit> signal;              ///< nothing: as faint as may be
 };
+/// Of the signal's limit only what stands in the table; the camera's part is left at 0.
 [[nodiscard]] VisibilitySpec read_visibility(const ConfigTable& table, SunModel sun,
                                              double half_diagonal_field_rad);
 
@@ -29,31 +52,8 @@ struct VisibilitySpec {
                                             const Position<J2000>& target,
                                             double height_m) noexcept;
 
-/// Negative in the Earth's shadow, taken as a cylinder: the distance to it in metres.
-[[nodiscard]] double shadow_margin_m(const Position<J2000>& body,
-                                     const Position<J2000>& sun) noexcept;
-
 /// Whether the line of sight, prolonged beyond the target, meets the Earth.
 [[nodiscard]] bool earth_is_behind(const Position<J2000>& camera,
                                    const Position<J2000>& target) noexcept;
-
-/// A time in which the camera can see the target. All positions geometric, no light time.
-struct Pass {
-  SimTime start;
-  SimTime end;
-  SimTime closest;
-  double min_range_m = 0;
-  Condition start_limited_by = Condition::kSpan;
-  Condition end_limited_by = Condition::kSpan;
-};
-
-/// All passes in [begin, end], edges to 1 ns of the model's own.
-///
-/// Lipschitz stepping: no margin can fall to zero sooner than it divided by its fastest change, so
-/// the step is as long as that allows and no pass longer than 1 ms is missed. Where the margins are
-/// all but zero the step is 1 ms.
-[[nodiscard]] std::vector<Pass> find_passes(const Propagator& camera, const Propagator& target,
-                                            const VisibilitySpec& spec, Epoch epoch, SimTime begin,
-                                            SimTime end);
 
 }  // namespace engine

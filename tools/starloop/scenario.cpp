@@ -244,6 +244,7 @@ Scenario read_scenario(const ConfigReader& config) {
   const ConfigTable visibility = config.table("visibility");
   s.visibility = engine::read_visibility(visibility, s.scene.sun.model,
                                          s.scene.camera.half_diagonal_field_rad());
+  s.scene.shadow = s.visibility.shadow;
   s.search_span = from_seconds(
       visibility.number_or("span_days", 15.0, engine::between(0.001, 1000.0)) * 86400.0);
 

@@ -8,7 +8,7 @@
 #include "drivers/open_link.h"
 #include "engine/imaging_chain.h"
 #include "engine/orbit/kepler.h"
-#include "engine/orbit/visibility.h"
+#include "engine/orbit/passes.h"
 #include "engine/render/render_spec.h"
 #include "engine/scene/brdf.h"
 #include "hil/closed_loop_pointing.h"
