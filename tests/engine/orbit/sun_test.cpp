@@ -1,11 +1,13 @@
 #include "engine/orbit/sun.h"
 
+#include <erfa.h>
 #include <cmath>
 #include <cstdio>
 
 #include <gtest/gtest.h>
 
 #include "engine/core/constants.h"
+#include "engine/orbit/sight_line.h"
 #include "engine/orbit/utc.h"
 #include "tests/support/csv.h"
 
@@ -108,6 +110,56 @@ TEST(Sun, CorrectedTable1ReproducesTable6) {
     // The paper prints seconds of time, 15", and arcseconds; it is 3" wrong at most beyond that.
     EXPECT_NEAR(ra_deg, 15.0 * sexagesimal(row.text("paper_calc_RA")), (7.5 + 3.0) / 3600.0);
     EXPECT_NEAR(dec_deg, sexagesimal(row.text("paper_calc_Dec")), (0.5 + 3.0) / 3600.0);
+  }
+}
+
+/// As an almanac has it: where an observer who moves with the Earth sees it, on the true equator
+/// and equinox of date.
+Eigen::Vector3d apparent_place(SunModel model, Epoch t) {
+  const Eigen::Vector3d seen = aberrated(sun_position(model, t).m.normalized(), earth_velocity(t));
+  const TwoPartDate tt = terrestrial_time(t);
+  double to_date[3][3];
+  eraPnm06a(tt.day1, tt.day2, to_date);
+  double gcrs[3] = {seen.x(), seen.y(), seen.z()};
+  double of_date[3];
+  eraRxp(to_date, gcrs, of_date);
+  return {of_date[0], of_date[1], of_date[2]};
+}
+
+std::string sexagesimal_text(double units, const char* format) {
+  const double seconds_of = std::abs(units) * 3600.0;
+  char text[40];
+  std::snprintf(text, sizeof text, format, units < 0.0 ? '-' : '+',
+                static_cast<int>(seconds_of / 3600.0),
+                static_cast<int>(std::fmod(seconds_of / 60.0, 60.0)), std::fmod(seconds_of, 60.0));
+  return text;
+}
+
+TEST(Sun, ApparentPlacesAreThoseOfTheAlmanacAndMakeTable6) {
+  const Csv reference("sun_table6_reference.csv");
+  std::printf("%-10s  %-13s %-12s  %-13s %-12s  %-9s %-9s  off, arcsec\n", "0h TT", "RA, ERFA",
+              "Dec", "RA, table 1", "Dec", "almanac", "");
+  for (const Csv::Row& row : reference.rows()) {
+    const Epoch t = *epoch_from_utc(row.text("date") + "T00:00:00") - from_seconds(69.184);
+    const Eigen::Vector3d erfa = apparent_place(SunModel::kErfa, t);
+    const Eigen::Vector3d table1 = apparent_place(SunModel::kTable1, t);
+    const double ra_deg = right_ascension_deg(erfa);
+    const double dec_deg = declination_deg(erfa);
+    // The Sun's own 16 m/s round the barycentre while its light is on its way: .01".
+    EXPECT_NEAR(ra_deg, row.number("ERFA_apparent_true_of_date_RA_deg"), 0.5 / 3600.0);
+    EXPECT_NEAR(dec_deg, row.number("ERFA_apparent_true_of_date_Dec_deg"), 0.5 / 3600.0);
+    EXPECT_LT(angle_between_rad(erfa, table1), 45.0 * kArcsecond) << row.text("date");
+    // The almanac's columns are rounded to seconds; March's declination is misprinted by 20".
+    EXPECT_NEAR(ra_deg, 15.0 * sexagesimal(row.text("paper_almanac_RA")), 8.0 / 3600.0);
+    const double misprint_deg = row.text("date") == "2022-03-01" ? 20.0 / 3600.0 : 0.0;
+    EXPECT_NEAR(dec_deg, sexagesimal(row.text("paper_almanac_Dec")) - misprint_deg, 1.0 / 3600.0);
+    std::printf("%-10s  %s %s  %s %s  %-9s %-9s  %.1f\n", row.text("date").c_str(),
+                sexagesimal_text(ra_deg / 15.0, "%c%02d %02d %05.2f").c_str(),
+                sexagesimal_text(dec_deg, "%c%02d %02d %04.1f").c_str(),
+                sexagesimal_text(right_ascension_deg(table1) / 15.0, "%c%02d %02d %05.2f").c_str(),
+                sexagesimal_text(declination_deg(table1), "%c%02d %02d %04.1f").c_str(),
+                row.text("paper_almanac_RA").c_str(), row.text("paper_almanac_Dec").c_str(),
+                angle_between_rad(erfa, table1) / kArcsecond);
   }
 }
 
