@@ -124,6 +124,10 @@ void ConfigReader::set(const std::string& assignment) {
   } catch (const toml::parse_error&) {
     parsed.insert_or_assign("v", value);  // a bare word
   }
+  // A bare date is one, too: scenarios have their dates as text.
+  if (const auto* node = parsed.get("v");
+      node->is_date_time() || node->is_date() || node->is_time())
+    parsed.insert_or_assign("v", value);
   toml::table* table = &document_->root;
   std::istringstream parts(path.substr(0, last_dot));
   for (std::string part; std::getline(parts, part, '.');) {

@@ -152,6 +152,8 @@ TEST(ConfigReader, SetRefusesWhatIsNoAssignment) {
 
 TEST(ConfigReader, SetTakesTextWithEqualsAndDots) {
   ConfigReader config = reader();
+  config.set("scenario.epoch=2022-01-01T00:00:00");
+  EXPECT_EQ(config.table("scenario").text("epoch"), "2022-01-01T00:00:00");
   config.set("scenario.epoch=2022-01-01T00:00:00x");
   config.set("target.mesh=a.b/c=d.obj");
   EXPECT_EQ(config.table("target").text("mesh"), "a.b/c=d.obj");
