@@ -135,6 +135,38 @@ TEST(Scenario, ThePapersOrbitsHaveSixteenPasses) {
   }
 }
 
+TEST(Scenario, ItsCamerasFieldAndNoiseSayWhatCanBeSeen) {
+  // config/flyby.toml: .36 m, .7 through the optics, .55 to electrons, 626.78 nm, 1 ms.
+  const Scenario bright = load({"visibility.least_snr=5", "visibility.target_radius_m=2"});
+  const engine::SignalLimit signal = bright.visibility.signal.value();
+  const double photon_j = engine::kPlanck_j_s * engine::kSpeedOfLight_m_s / 626.78e-9;
+  const double pupil_m2 = engine::kPi / 4.0 * 0.36 * 0.36;
+  EXPECT_NEAR(signal.electrons_per_w_m2 / (pupil_m2 * 0.7 * 0.55 * 1e-3 / photon_j), 1.0, 1e-6);
+  EXPECT_DOUBLE_EQ(signal.ifov_rad, 6.5e-6 / 4.5);
+  EXPECT_GT(signal.dark_noise_e, 2.0);  // to read
+  EXPECT_EQ(starloop::passes_of(bright).size(), 16U);
+  // A ball of 4 cm is too faint at 300 km, and against the light.
+  const auto faint =
+      starloop::passes_of(load({"visibility.least_snr=5", "visibility.target_radius_m=0.02"}));
+  EXPECT_GT(faint.size(), 0U);
+  EXPECT_LT(faint.size(), 16U);
+  for (const engine::Pass& pass : faint) {
+    EXPECT_EQ(pass.start_limited_by, engine::Condition::kSignal);
+    EXPECT_LT(pass.min_range_m, 200e3);
+  }
+  EXPECT_THROW(load({"visibility.least_snr=5"}), engine::ConfigError);  // of what size?
+
+  const std::vector<std::string> place{"guidance.boresight_ra_deg=10",
+                                       "guidance.boresight_dec_deg=20"};
+  EXPECT_FALSE(load(place).visibility.field.has_value());
+  std::vector<std::string> held = place;
+  held.push_back("visibility.in_field=true");
+  const engine::FieldOfView field = load(held).visibility.field.value();
+  EXPECT_NEAR(field.right_tan - field.left_tan, 1024 * 6.5e-6 / 4.5, 1e-12);
+  EXPECT_NEAR(field.left_tan, -512.5 * 6.5e-6 / 4.5, 1e-12);
+  EXPECT_TRUE(starloop::passes_of(load(held)).empty());
+}
+
 struct BadValue {
   std::string assignment;
   std::string key;  ///< the complaint is about this one
@@ -195,6 +227,12 @@ const std::vector<BadValue> kBadValues = {
     {"render.caustics=none", "render.caustics", "got \"none\""},
     {"render.sun_disc=half", "render.sun_disc", "got \"half\""},
     {"brdf.variant=shiny", "brdf.variant", "got \"shiny\""},
+    {"visibility.shadow=square", "visibility.shadow", "\"oblate-cone\", got \"square\""},
+    {"visibility.least_snr=-1", "visibility.least_snr", "got -1"},
+    {"visibility.target_radius_m=2", "visibility.target_radius_m", "no use without least_snr"},
+    {"visibility.target_albedo=0", "visibility.target_albedo", "got 0"},
+    {"visibility.in_field=true", "visibility.in_field", "needs guidance.boresight_ra_deg"},
+    {"visibility.in_field=1", "visibility.in_field", "must be true or false"},
     {"actuator.damping=0", "actuator.damping", "got 0"},
     {"actuator.rate_limit_mrad_s=0", "actuator.rate_limit_mrad_s", "must be > 0, got 0"},
     {"tracker.alpha=1.5", "tracker.alpha", "got 1.5"},

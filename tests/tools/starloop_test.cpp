@@ -210,6 +210,7 @@ TEST(StarloopRun, BadInputIsTwoAndSaysWhatIsWrong) {
       {{"run", kFlyby, "--out", out, "--set", "target.mesh=/nowhere/x.obj"}, "/nowhere/x.obj"},
       {{"passes", "/nowhere/at_all.toml"}, "/nowhere/at_all.toml"},
       {{"passes", kFlyby, "--time", "3"}, "--time"},
+      {{"passes", kFlyby, "--pass", "0"}, "--pass"},
       {{"render", kFlyby}, "--time"},
       {{"render", kFlyby, "--time", "soon"}, "--time"},
       {{"render", kFlyby, "--time", "-1"}, "--time"},
@@ -284,11 +285,16 @@ TEST(StarloopPasses, PrintsSixteenObjectsWithTheDocumentedKeys) {
   ASSERT_EQ(passes.size(), 16U);
   double last_end_s = 0;
   for (const nlohmann::json& p : passes) {
-    ASSERT_EQ(p.size(), 7U);
-    for (const char* key : {"start_s", "end_s", "duration_s", "closest_s", "min_range_km"})
+    ASSERT_EQ(p.size(), 17U);
+    for (const char* key :
+         {"start_s", "end_s", "duration_s", "closest_s", "min_range_km", "start_range_rate_km_s",
+          "end_range_rate_km_s", "max_line_of_sight_rate_mrad_s", "closest_phase_angle_deg",
+          "least_lit_fraction", "earth_behind_share"})
       ASSERT_TRUE(p.at(key).is_number()) << key;
-    for (const char* key : {"start_limited_by", "end_limited_by"})
+    for (const char* key :
+         {"start_utc", "closest_utc", "end_utc", "start_limited_by", "end_limited_by"})
       ASSERT_TRUE(p.at(key).is_string()) << key;
+    EXPECT_EQ(p.at("truncated"), false);
     EXPECT_GT(p.at("start_s").get<double>(), last_end_s);
     EXPECT_GT(p.at("end_s").get<double>(), p.at("start_s").get<double>());
     EXPECT_NEAR(p.at("duration_s").get<double>(),
@@ -296,6 +302,80 @@ TEST(StarloopPasses, PrintsSixteenObjectsWithTheDocumentedKeys) {
     EXPECT_LT(p.at("min_range_km").get<double>(), 300.0);
     last_end_s = p.at("end_s").get<double>();
   }
+}
+
+TEST(StarloopPasses, TellsWhatThePapersPassIsLike) {
+  const Outcome run = starloop({"passes", kFlyby, "--json"});
+  ASSERT_EQ(run.exit_code, kGood) << run.err;
+  const nlohmann::json pass = nlohmann::json::parse(run.out).at(2);
+  // range_windows_15d.csv, to the digits that stand there.
+  EXPECT_EQ(pass.at("start_utc"), "2022-01-04T14:02:41.630");
+  EXPECT_EQ(pass.at("end_utc"), "2022-01-04T14:03:21.782");
+  EXPECT_NEAR(pass.at("max_line_of_sight_rate_mrad_s").get<double>(), 210.890042, 1e-5);
+  EXPECT_NEAR(pass.at("closest_phase_angle_deg").get<double>(), 109.0832, 5e-5);
+  EXPECT_NEAR(pass.at("earth_behind_share").get<double>(),
+              (309790.435773 - 309773.159663) / 40.151593, 1e-6);
+  EXPECT_EQ(pass.at("least_lit_fraction"), 1.0);
+  // The range is sqrt(r0^2 + (v t)^2) of 300 km with 68.966 km at the closest, 14.544 km/s: the
+  // bend of the orbits leaves some m/s.
+  const double rate_km_s = 14.544238 * std::sqrt(1.0 - std::pow(68.965979 / 300.0, 2));
+  EXPECT_NEAR(pass.at("start_range_rate_km_s").get<double>(), -rate_km_s, 0.03);
+  EXPECT_NEAR(pass.at("end_range_rate_km_s").get<double>(), rate_km_s, 0.03);
+}
+
+TEST(StarloopPasses, WritesTablesAndDrawsThem) {
+  const TemporaryFolder folder;
+  const std::string csv = (folder.path() / "table.csv").string();
+  const fs::path out = folder.path() / "made" / "here";
+  const Outcome run = starloop({"passes", kFlyby, "--csv", csv, "--out", out.string(), "--pass",
+                                "12", "--set", "scenario.epoch=2022-01-03T00:00:00", "--set",
+                                "visibility.shadow=cylinder", "--set", "visibility.span_days=12"});
+  ASSERT_EQ(run.exit_code, kGood) << run.err;
+  EXPECT_EQ(content_of(csv), content_of(out / "passes.csv"));
+  const std::string table = content_of(csv);
+  EXPECT_EQ(std::count(table.begin(), table.end(), '\n'), 17);
+  // visible_windows_other_epochs.csv: the twelfth comes out of the cylinder's shadow.
+  const nlohmann::json passes = nlohmann::json::parse(content_of(out / "passes.json"));
+  EXPECT_NEAR(passes.at(11).at("start_s").get<double>(), 1015177.153943, 1e-3);
+  EXPECT_EQ(passes.at(11).at("start_limited_by"), "eclipse");
+  const std::string conditions = content_of(out / "conditions.csv");
+  for (const char* row :
+       {"\nspan,0.000000000,1036800.0", "\nrange,1015164.872", "\neclipse,", "\nline-of-sight,",
+        "\nsun-exclusion,0.0", "\nall,1015177.153", "\nearth-behind,10151"})
+    EXPECT_NE(conditions.find(row), std::string::npos) << row;
+  const std::string curves = content_of(out / "pass_12.csv");
+  EXPECT_EQ(std::count(curves.begin(), curves.end(), '\n'), 403);  // 401, the closest, a header
+  if (run.out.find("no picture") != std::string::npos) GTEST_SKIP() << "no python3 with matplotlib";
+  for (const char* name : {"passes.png", "pass_12.png"})
+    EXPECT_GT(fs::file_size(out / name), 10'000U) << name;
+}
+
+TEST(StarloopPasses, OfAShadowWithAPenumbraBeginLater) {
+  // That pass again: past the flattened Earth the last of the umbra is crossed at another time.
+  const auto start_s = [](const std::string& shadow) {
+    const Outcome run =
+        starloop({"passes", kFlyby, "--json", "--set", "scenario.epoch=2022-01-03T00:00:00",
+                  "--set", "visibility.shadow=" + shadow});
+    EXPECT_EQ(run.exit_code, kGood) << run.err;
+    return nlohmann::json::parse(run.out).at(11).at("start_s").get<double>();
+  };
+  const double cone_s = start_s("cone");
+  // Half a penumbra of eight seconds or so before the cylinder lets go.
+  EXPECT_NEAR(cone_s, 1015177.15 - 4.5, 1.5);
+  EXPECT_LT(start_s("oblate-cone"), cone_s);  // a smaller Earth
+}
+
+TEST(StarloopPasses, ThatThereAreNoneIsSaidAndDrawn) {
+  const TemporaryFolder folder;
+  const fs::path out = folder.path() / "none";
+  const Outcome run = starloop({"passes", kFlyby, "--out", out.string(), "--set",
+                                "visibility.max_range_km=1", "--set", "visibility.span_days=1"});
+  EXPECT_EQ(run.exit_code, kGood) << run.err;
+  EXPECT_EQ(run.out.rfind("0 passes", 0), 0U) << run.out;
+  EXPECT_EQ(nlohmann::json::parse(content_of(out / "passes.json")), nlohmann::json::array());
+  const Outcome wrong = starloop({"passes", kFlyby, "--pass", "17"});
+  EXPECT_EQ(wrong.exit_code, kBadInput);
+  EXPECT_NE(wrong.err.find("--pass must be one of the 16 passes"), std::string::npos) << wrong.err;
 }
 
 TEST(StarloopMtf, WritesEveryTermAndTheirProduct) {

@@ -76,10 +76,16 @@ int run_command(int argc, char** argv) {
   CLI::App* links_app = app.add_subcommand(
       "links", "List the links that this machine has, and what others would need");
 
-  bool json = false;
+  starloop::PassesOptions passes;
   CLI::App* passes_app = app.add_subcommand("passes", "List when the camera can see the target");
   add_common(*passes_app, common);
-  passes_app->add_flag("--json", json, "print an array of objects");
+  passes_app->add_flag("--json", passes.as_json, "print an array of objects");
+  passes_app->add_option("--csv", passes.csv, "CSV file that gets the table");
+  passes_app->add_option("--out", passes.out,
+                         "folder that gets passes.csv, passes.json and pictures of the conditions "
+                         "and of one pass");
+  passes_app->add_option("--pass", passes.number, "the pass that is drawn; default: run.pass")
+      ->check(CLI::Range(1, 1'000'000));
 
   starloop::RenderOptions render;
   CLI::App* render_app = app.add_subcommand("render", "Write frames as FITS and PNG");
@@ -165,7 +171,7 @@ int run_command(int argc, char** argv) {
   if (stages_app->parsed()) return starloop::render_stages(common, stages);
   if (bench_app->parsed()) return starloop::characterize_camera(common, bench_folder);
   if (links_app->parsed()) return starloop::list_links();
-  if (passes_app->parsed()) return starloop::list_passes(common, json);
+  if (passes_app->parsed()) return starloop::list_passes(common, passes);
   return starloop::render_frames(common, render);
 }
 

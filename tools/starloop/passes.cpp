@@ -1,46 +1,105 @@
 #include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
 
 #include <nlohmann/json.hpp>
 
-#include "engine/orbit/utc.h"
+#include "engine/core/constants.h"
+#include "tools/starloop/pass_report.h"
+#include "tools/starloop/plot_script.h"
 #include "tools/starloop/subcommands.h"
 
 namespace starloop {
+namespace {
 
-int list_passes(const CommonOptions& options, bool as_json) {
-  using engine::seconds;
-  const Scenario scenario = load_scenario(options);
-  const std::vector<engine::Pass> passes = passes_of(scenario);
-  if (as_json) {
-    nlohmann::ordered_json list = nlohmann::ordered_json::array();
-    for (const engine::Pass& p : passes) {
-      list.push_back({{"start_s", seconds(p.start)},
-                      {"end_s", seconds(p.end)},
-                      {"duration_s", seconds(p.end - p.start)},
-                      {"closest_s", seconds(p.closest)},
-                      {"min_range_km", p.min_range_m * 1e-3},
-                      {"start_limited_by", name_of(p.start_limited_by)},
-                      {"end_limited_by", name_of(p.end_limited_by)}});
-    }
-    std::printf("%s\n", list.dump(2).c_str());
+namespace fs = std::filesystem;
+using engine::seconds;
+
+/// A file that is complete or an error.
+template <class Write>
+void write_file(const fs::path& path, const Write& write) {
+  std::ofstream file(path);
+  write(file);
+  file.close();
+  if (!file) throw std::runtime_error(path.string() + ": cannot be written");
+}
+
+void print_table(const PassReport& report) {
+  std::printf("%4s  %-23s %-12s %-12s %13s %13s %13s %9s %9s %15s %8s %6s %6s %-8s  %s\n", "pass",
+              "AOS, UTC", "TCA", "LOS", "AOS, s", "TCA, s", "LOS, s", "lasts, s", "range, km",
+              "at AOS, LOS, km/s", "mrad/s", "phase", "Earth", "light", "limited by");
+  std::size_t number = 0;
+  for (const PassFacts& facts : report.passes()) {
+    const engine::Pass& p = facts.pass;
+    const std::string closest = report.utc(p.closest);
+    const std::string end = report.utc(p.end);
+    const std::size_t clock = closest.find('T') + 1;
+    std::printf(
+        "%4zu  %-23s %-12s %-12s %13.3f %13.3f %13.3f %9.3f %9.3f %8.3f %+8.3f %8.2f %6.1f %5.1f%% "
+        "%-8s  %s, %s%s\n",
+        ++number, report.utc(p.start).c_str(), closest.c_str() + clock, end.c_str() + clock,
+        seconds(p.start), seconds(p.closest), seconds(p.end), seconds(p.end - p.start),
+        p.min_range_m * 1e-3, facts.start_range_rate_m_s * 1e-3, facts.end_range_rate_m_s * 1e-3,
+        facts.largest_rate_rad_s * 1e3, facts.phase_angle_rad / engine::kDegree,
+        facts.earth_behind_share * 100.0, facts.least_lit < 1.0 ? "penumbra" : "sunlit",
+        name_of(p.start_limited_by).data(), name_of(p.end_limited_by).data(),
+        p.truncated() ? " (truncated)" : "");
+  }
+}
+
+/// All files of --out. Returns whether the pictures were drawn.
+bool write_folder(const PassReport& report, const fs::path& folder, std::size_t number) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) throw std::runtime_error(folder.string() + ": " + error.message());
+  write_file(folder / "passes.csv", [&](std::ostream& csv) { report.write_csv(csv); });
+  write_file(folder / "passes.json",
+             [&](std::ostream& json) { json << report.json().dump(2) << '\n'; });
+  write_file(folder / "conditions.csv", [&](std::ostream& csv) { report.write_conditions(csv); });
+  if (number == 0) return run_plot_script("passes.py", folder);
+  const std::string curves = "pass_" + std::to_string(number) + ".csv";
+  write_file(folder / curves, [&](std::ostream& csv) { report.write_curves(csv, number); });
+  return run_plot_script("passes.py", folder, std::to_string(number));
+}
+
+/// The pass that is looked at closely; 0 when there are none.
+std::size_t chosen_number(const PassReport& report, const Scenario& scenario, std::size_t asked) {
+  const std::size_t count = report.passes().size();
+  if (asked > count)
+    throw engine::ConfigError("--pass must be one of the " + std::to_string(count) +
+                              " passes that these orbits have, got " + std::to_string(asked));
+  return asked > 0 ? asked : std::min(scenario.run.pass, count);
+}
+
+}  // namespace
+
+int list_passes(const CommonOptions& options, const PassesOptions& passes) {
+  Scenario scenario = load_scenario(options);
+  scenario.run.pattern = true;  // no renderer is wanted, only where things are
+  const Rig rig(scenario, 1);
+  const PassReport report(scenario, rig);
+  const std::size_t number = chosen_number(report, scenario, passes.number);
+  if (!passes.csv.empty())
+    write_file(passes.csv, [&](std::ostream& csv) { report.write_csv(csv); });
+  const bool drawn = passes.out.empty() || write_folder(report, passes.out, number);
+  if (passes.as_json) {
+    std::printf("%s\n", report.json().dump(2).c_str());
     return kGood;
   }
   if (!options.quiet) {
     std::printf("%zu passes in %.6g days from %s UTC, closer than %.6g km, target lit:\n",
-                passes.size(), seconds(scenario.search_span) / 86400.0,
-                engine::utc_text(scenario.scene.epoch).c_str(),
-                scenario.visibility.max_range_m * 1e-3);
+                report.passes().size(), seconds(scenario.search_span) / 86400.0,
+                report.utc(engine::SimTime{}).c_str(), scenario.visibility.max_range_m * 1e-3);
   }
-  std::printf("%4s  %-23s %15s %15s %9s %15s %11s  %s\n", "pass", "start, UTC", "start, s",
-              "end, s", "lasts, s", "closest, s", "range, km", "limited by");
-  std::size_t number = 0;
-  for (const engine::Pass& p : passes) {
-    std::printf("%4zu  %-23s %15.3f %15.3f %9.3f %15.3f %11.3f  %s, %s\n", ++number,
-                engine::utc_text(scenario.scene.epoch + p.start.time_since_epoch()).c_str(),
-                seconds(p.start), seconds(p.end), seconds(p.end - p.start), seconds(p.closest),
-                p.min_range_m * 1e-3, name_of(p.start_limited_by).data(),
-                name_of(p.end_limited_by).data());
-  }
+  print_table(report);
+  if (options.quiet) return kGood;
+  std::printf(
+      "AOS, TCA, LOS: begin, closest approach, end. Range: least. mrad/s: how fast the "
+      "line of sight turns at most.\nPhase: angle at the target between Sun and camera, deg, "
+      "at TCA. Earth: how long it is behind the target.\n");
+  if (!passes.out.empty()) std::printf("%s: tables and pictures\n", passes.out.c_str());
+  if (!drawn) std::printf("no picture: /usr/bin/python3 with matplotlib did not draw it\n");
   return kGood;
 }
 

@@ -187,6 +187,26 @@ engine::EarthshineSensor earthshine_sensor(const engine::SensorNoise& noise,
   return sensor;
 }
 
+/// The camera's part in what can be seen: its field, where it stays in the sky, and its noise.
+void complete_visibility(const ConfigTable& table, Scenario& s) {
+  const engine::CameraGeometry& camera = s.scene.camera;
+  if (table.flag_or("in_field", false)) {
+    if (!s.boresight) table.fail("in_field", "needs guidance.boresight_ra_deg and _dec_deg");
+    const Eigen::Vector3d first = camera.straight_direction_at({-0.5, -0.5});
+    const Eigen::Vector3d last =
+        camera.straight_direction_at({camera.width_px - 0.5, camera.height_px - 0.5});
+    s.visibility.field = {s.boresight->axes, first.x(), last.x(), first.y(), last.y()};
+  }
+  if (!s.visibility.signal) return;
+  engine::SignalLimit& signal = *s.visibility.signal;
+  signal.sun_w_m2 = sun_irradiance_w_m2(s.scene.sun, engine::kAstronomicalUnit_m);
+  signal.ifov_rad = camera.ifov_rad();
+  // Light at the pupil spreads over the detector as the radiance of one pixel's angle does.
+  signal.electrons_per_w_m2 = throughput_sr(s.optics) / (signal.ifov_rad * signal.ifov_rad) *
+                              s.detector.electrons_per_irradiance(s.run.exposure);
+  signal.dark_noise_e = s.detector.noise_e(s.detector.dark_mean_e(s.run.exposure));
+}
+
 /// One of few periods to an exposure is a line of the jitter, whose path each exposure integrates.
 void take_slow_vibration(Scenario& s) {
   engine::VibrationSpec& vibration = s.optics.vibration;
@@ -277,6 +297,7 @@ Scenario read_scenario(const ConfigReader& config) {
                                          {{"celestial", hil::RollRule::kCelestial},
                                           {"vertical", hil::RollRule::kVertical}});
   s.boresight = read_boresight(config.table("guidance"));
+  complete_visibility(visibility, s);
   s.actuator = hil::read_actuator(config.table("actuator"));
   s.realtime = hil::read_realtime(config.table("realtime"));
   s.link = drivers::read_link(config.table("link"));

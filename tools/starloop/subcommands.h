@@ -10,8 +10,14 @@ namespace starloop {
 /// What the shell is told.
 enum ExitCode : int { kGood = 0, kCriterionFailed = 1, kBadInput = 2, kDeviceFault = 3 };
 
-/// Lists the passes of a scenario.
-int list_passes(const CommonOptions& options, bool as_json);
+struct PassesOptions {
+  bool as_json = false;
+  std::string csv;         ///< file that gets the table; empty: none
+  std::string out;         ///< folder that gets tables and pictures; empty: none
+  std::size_t number = 0;  ///< of the pass that is drawn, from 1; 0: the scenario's
+};
+/// Lists the passes of a scenario, writes and draws them.
+int list_passes(const CommonOptions& options, const PassesOptions& passes);
 
 /// Says which links this machine can do, and what the others need.
 int list_links();

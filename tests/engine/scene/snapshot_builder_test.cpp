@@ -159,6 +159,37 @@ TEST(SnapshotBuilder, SwitchesTheSunOffInTheShadow) {
   EXPECT_GT(lit, 20);
 }
 
+TEST(SnapshotBuilder, LetsTheSunSetByTheShareOfItsDisc) {
+  const Flyby flyby;
+  // The target's first sunset: the last second in which all of the Sun is seen, and on.
+  const auto lit = [&](double t_s) {
+    const Epoch now = flyby.at(t_s);
+    return lit_fraction(ShadowModel::kOblateCone, flyby.target.at(now).position,
+                        sun_position(SunModel::kErfa, now));
+  };
+  double sunset_s = 0.0;
+  while (lit(sunset_s) < 1.0 || lit(sunset_s + 1.0) == 1.0) sunset_s += 1.0;
+  SceneSpec spec = spec_of(flyby);
+  spec.light_path = LightPath::kGeometric;
+  const SnapshotBuilder builder(spec, flyby.camera, flyby.target);
+  spec.shadow = ShadowModel::kCylinder;
+  const SnapshotBuilder by_cylinder(spec, flyby.camera, flyby.target);
+  const double full_w_m2 = builder.build(tracked_shot(flyby, sunset_s)).sun.irradiance_w_m2;
+  int fading = 0;
+  for (int i = 0; i < 20; ++i) {
+    const Shot shot = tracked_shot(flyby, sunset_s + i);
+    const Snapshot s = builder.build(shot);
+    const double there = lit(sunset_s + i);
+    EXPECT_NEAR(s.sun.irradiance_w_m2 / full_w_m2, there, 1e-6) << i;
+    fading += there > 0.0 && there < 1.0 ? 1 : 0;
+    const double switched = by_cylinder.build(shot).sun.irradiance_w_m2 / full_w_m2;
+    EXPECT_NEAR(switched * (1.0 - switched), 0.0, 1e-5) << i;
+    // The Earth's own light goes on.
+    EXPECT_EQ(s.earthshine.irradiance_w_m2, by_cylinder.build(shot).earthshine.irradiance_w_m2);
+  }
+  EXPECT_GE(fading, 7);  // it takes eight seconds
+}
+
 TEST(SnapshotBuilder, LightsFromBelowOnTheDaySide) {
   const Flyby flyby;
   SceneSpec spec = spec_of(flyby);
