@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "engine/core/constants.h"
+#include "engine/orbit/sun.h"
 #include "engine/scene/camera_geometry.h"
 #include "tests/support/csv.h"
 #include "tests/support/scenes.h"
@@ -91,6 +92,28 @@ TEST(SightLine, ApparentPlaceIsOffByTheRelativeSpeedOverC) {
   const Vector3d shift = apparent.apparent.unit - geometric.apparent.unit;
   const Vector3d relative = geometric.target.velocity.m_s - geometric.camera.velocity.m_s;
   EXPECT_LT(shift.dot(relative), 0.0);  // the target lags behind
+}
+
+TEST(SightLine, ATargetMovesAgainstTheStarsBehindItByItsOwnSpeedOverC) {
+  // What the camera's speed does to both is the same; what is left is the target's light time, and
+  // that stars are seen from an Earth that moves: 30 and 8 km/s.
+  const Flyby flyby;
+  for (const double t_s : {0.0, kClosestOfPass3_s, 1e6}) {
+    const Epoch now = flyby.at(t_s);
+    const SightLine geometric = sight_line(flyby.camera, flyby.target, now, LightPath::kGeometric);
+    const SightLine apparent = sight_line(flyby.camera, flyby.target, now, LightPath::kApparent);
+    const Vector3d star = geometric.toward_target.unit;  // hidden by it, were light infinitely fast
+    const Vector3d earth_m_s = earth_velocity(now).m_s;
+    const Vector3d seen = engine::aberrated(star, {geometric.camera.velocity.m_s + earth_m_s});
+    const Vector3d speed_m_s = geometric.target.velocity.m_s + earth_m_s;
+    const Vector3d expected = -(speed_m_s - speed_m_s.dot(star) * star) / kSpeedOfLight_m_s;
+    // Of second order, (1.3e-4)^2, .012 px. Far off, the target's orbit bends meanwhile.
+    const double bend_rad = 0.5 * 8.7 * geometric.range_m / (kSpeedOfLight_m_s * kSpeedOfLight_m_s);
+    EXPECT_LT((apparent.apparent.unit - seen - expected).norm() * kPixelsPerRadian,
+              0.012 + bend_rad * kPixelsPerRadian)
+        << t_s;
+    EXPECT_GT(expected.norm() * kPixelsPerRadian, 20.0);
+  }
 }
 
 TEST(SightLine, RatesAreThoseOfTheReferencePasses) {
