@@ -251,6 +251,7 @@ TEST(StarloopRun, APatternGoesOverEveryLinkAndComesBackFromItsLog) {
   EXPECT_EQ(run.exit_code, kGood) << run.err;
   const nlohmann::json report = report_of(folder.path());
   EXPECT_TRUE(report.at("criteria_met").is_null()) << "there is nothing to judge";
+  EXPECT_EQ(report.at("pass").at("truncated"), false);
   EXPECT_EQ(report.at("links").at(0).at("name"), "mock");
   EXPECT_EQ(report.at("links").at(1).at("sent"), 6);
   EXPECT_EQ(report.at("links").at(1).at("failed"), 0);

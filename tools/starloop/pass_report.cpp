@@ -66,7 +66,10 @@ void write_windows(std::ostream& csv, std::string_view name, const std::vector<W
 }  // namespace
 
 PassReport::PassReport(const Scenario& scenario, const Rig& rig)
-    : scenario_(scenario), camera_(rig.camera()), target_(rig.target()) {
+    : scenario_(scenario),
+      camera_(rig.camera()),
+      target_(rig.target()),
+      sun_(scenario.visibility.sun) {
   for (const Pass& pass : passes_of(scenario)) passes_.push_back(facts_of(pass));
 }
 
@@ -74,10 +77,10 @@ std::string PassReport::utc(SimTime t) const {
   return engine::utc_text(scenario_.scene.epoch + t.time_since_epoch());
 }
 
-PassMoment PassReport::at(SimTime t) const {
+PassMoment PassReport::at(SimTime t) {
   const engine::Epoch now = scenario_.scene.epoch + t.time_since_epoch();
   const engine::SightLine line = sight_line(camera_, target_, now, engine::LightPath::kGeometric);
-  const auto sun = sun_position(scenario_.visibility.sun, now);
+  const engine::Position<engine::J2000> sun = sun_.at(now);
   PassMoment moment;
   moment.t = t;
   moment.range_m = line.range_m;
@@ -96,7 +99,7 @@ std::vector<Window> PassReport::windows(engine::Conditions conditions, SimTime b
                       begin, end);
 }
 
-PassFacts PassReport::facts_of(const Pass& pass) const {
+PassFacts PassReport::facts_of(const Pass& pass) {
   PassFacts facts;
   facts.pass = pass;
   facts.start_range_rate_m_s = at(pass.start).range_rate_m_s;
@@ -157,7 +160,7 @@ void PassReport::write_conditions(std::ostream& csv) const {
                   windows({Condition::kEarthBehind}, pass.start, pass.end));
 }
 
-void PassReport::write_curves(std::ostream& csv, std::size_t number) const {
+void PassReport::write_curves(std::ostream& csv, std::size_t number) {
   const Pass& pass = passes_.at(number - 1).pass;
   csv << "time_s,range_km,range_rate_km_s,line_of_sight_rate_mrad_s,phase_angle_deg,lit_fraction,"
          "earth_behind\n";

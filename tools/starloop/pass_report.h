@@ -7,6 +7,7 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "engine/orbit/passes.h"
+#include "engine/orbit/sun_track.h"
 #include "tools/starloop/scenario.h"
 
 namespace starloop {
@@ -39,7 +40,7 @@ class PassReport {
   PassReport(const Scenario& scenario, const Rig& rig);
 
   [[nodiscard]] const std::vector<PassFacts>& passes() const noexcept { return passes_; }
-  [[nodiscard]] PassMoment at(engine::SimTime t) const;
+  [[nodiscard]] PassMoment at(engine::SimTime t);
   [[nodiscard]] std::string utc(engine::SimTime t) const;
 
   [[nodiscard]] nlohmann::ordered_json json() const;
@@ -48,10 +49,10 @@ class PassReport {
   /// whole search.
   void write_conditions(std::ostream& csv) const;
   /// Pre: a number of one of them, from 1.
-  void write_curves(std::ostream& csv, std::size_t number) const;
+  void write_curves(std::ostream& csv, std::size_t number);
 
  private:
-  [[nodiscard]] PassFacts facts_of(const engine::Pass& pass) const;
+  [[nodiscard]] PassFacts facts_of(const engine::Pass& pass);
   [[nodiscard]] std::vector<engine::Window> windows(engine::Conditions conditions,
                                                     engine::SimTime begin,
                                                     engine::SimTime end) const;
@@ -59,6 +60,7 @@ class PassReport {
   const Scenario& scenario_;
   const engine::Propagator& camera_;
   const engine::Propagator& target_;
+  engine::SunTrack sun_;
   std::vector<PassFacts> passes_;
 };
 

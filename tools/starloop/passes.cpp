@@ -49,7 +49,7 @@ void print_table(const PassReport& report) {
 }
 
 /// All files of --out. Returns whether the pictures were drawn.
-bool write_folder(const PassReport& report, const fs::path& folder, std::size_t number) {
+bool write_folder(PassReport& report, const fs::path& folder, std::size_t number) {
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) throw std::runtime_error(folder.string() + ": " + error.message());
@@ -78,7 +78,7 @@ int list_passes(const CommonOptions& options, const PassesOptions& passes) {
   Scenario scenario = load_scenario(options);
   scenario.run.pattern = true;  // no renderer is wanted, only where things are
   const Rig rig(scenario, 1);
-  const PassReport report(scenario, rig);
+  PassReport report(scenario, rig);
   const std::size_t number = chosen_number(report, scenario, passes.number);
   if (!passes.csv.empty())
     write_file(passes.csv, [&](std::ostream& csv) { report.write_csv(csv); });

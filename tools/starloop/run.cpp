@@ -18,11 +18,12 @@ void introduce(const Flight::Plan& plan, const Rig& rig, const Flight& flight) {
   const Scenario& scenario = plan.scenario;
   const engine::Pass& pass = plan.pass;
   spdlog::info(
-      "{}: pass {} from {} UTC, {:.3f} s to {:.3f} s, closest {:.3f} km; {} triangles, "
+      "{}: pass {} from {} UTC, {:.3f} s to {:.3f} s, closest {:.3f} km{}; {} triangles, "
       "{} threads{}",
       scenario.name, scenario.run.pass,
       engine::utc_text(scenario.scene.epoch + pass.start.time_since_epoch()), seconds(pass.start),
-      seconds(pass.end), pass.min_range_m * 1e-3, rig.triangles(), rig.threads(),
+      seconds(pass.end), pass.min_range_m * 1e-3,
+      pass.truncated() ? " (goes on beyond the search)" : "", rig.triangles(), rig.threads(),
       plan.open_loop ? "; open loop" : "");
   if (!rig.star_text().empty()) spdlog::info("{}", rig.star_text());
   spdlog::info("{}", flight.text());
