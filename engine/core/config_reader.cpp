@@ -121,6 +121,8 @@ void ConfigReader::set(const std::string& assignment) {
   toml::table parsed;
   try {
     parsed = toml::parse("v = " + value);
+    const toml::node& v = *parsed.get("v");
+    if (v.is_date() || v.is_time() || v.is_date_time()) parsed.insert_or_assign("v", value);
   } catch (const toml::parse_error&) {
     parsed.insert_or_assign("v", value);  // a bare word
   }

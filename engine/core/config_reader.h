@@ -63,7 +63,8 @@ class ConfigReader {
   ConfigReader(ConfigReader&&) noexcept;
   ConfigReader& operator=(ConfigReader&&) noexcept;
 
-  /// "table.key=value", the value as TOML would write it; bare words count as text.
+  /// "table.key=value", the value as TOML would write it; bare words and dates count as
+  /// text.
   void set(const std::string& assignment);
 
   /// A table by its dotted name; one that is not there reads as empty.

@@ -1,40 +1,170 @@
 #include "engine/orbit/utc.h"
 
 #include <erfa.h>
+#include <algorithm>
+#include <chrono>
+#include <cmath>
 #include <cstdio>
 
 namespace engine {
 namespace {
 
+using std::chrono::days;
+using std::chrono::sys_days;
+using std::chrono::year_month_day;
+
 constexpr double kJ2000Date = 2451545.0;
 constexpr double kNanosecondsPerDay = 86400e9;
-constexpr int kFirstUtcYear = 1972;  // before, UTC ran at another rate than TAI
+constexpr std::int64_t kSecond_ns = 1'000'000'000;
+constexpr std::int64_t kDay_ns = 86400 * kSecond_ns;
+constexpr sys_days kDayOfJ2000 = std::chrono::year{2000} / 1 / 1;  // an Epoch of zero is its noon
+constexpr Duration kTtMinusTai{32'184'000'000};
+constexpr Duration kTaiMinusGps{19'000'000'000};
+
+/// Reads a date from its beginning on.
+class DateText {
+ public:
+  explicit DateText(std::string_view text) : rest_(text) {}
+
+  /// Just so many digits; nothing else will do, a sign or a blank neither.
+  [[nodiscard]] std::optional<int> digits(std::size_t count) noexcept {
+    if (rest_.size() < count) return std::nullopt;
+    int value = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      if (rest_[i] < '0' || rest_[i] > '9') return std::nullopt;
+      value = 10 * value + (rest_[i] - '0');
+    }
+    rest_.remove_prefix(count);
+    return value;
+  }
+  [[nodiscard]] bool take(char c) noexcept {
+    if (rest_.empty() || rest_[0] != c) return false;
+    rest_.remove_prefix(1);
+    return true;
+  }
+  /// ".25" is 250 000 000; none is 0. Nothing for a point without digits and for more than nine.
+  [[nodiscard]] std::optional<std::int64_t> decimals_ns() noexcept {
+    if (!take('.')) return 0;
+    std::int64_t value = 0;
+    int count = 0;
+    for (; count < 9; ++count) {
+      const auto digit = digits(1);
+      if (!digit) break;
+      value = 10 * value + *digit;
+    }
+    if (count == 0) return std::nullopt;
+    for (; count < 9; ++count) value *= 10;
+    return value;
+  }
+  [[nodiscard]] std::size_t left() const noexcept { return rest_.size(); }
+  [[nodiscard]] char operator[](std::size_t i) const noexcept { return rest_[i]; }
+
+ private:
+  std::string_view rest_;
+};
+
+std::optional<sys_days> read_day(DateText& text) noexcept {
+  const auto year = text.digits(4);
+  if (!year || *year < kFirstYear || *year > kLastYear || !text.take('-')) return std::nullopt;
+  const std::chrono::year y{*year};
+  const bool by_month = text.left() > 2 && text[2] == '-';
+  if (!by_month) {
+    const auto day = text.digits(3);
+    if (!day || *day < 1 || *day > (y.is_leap() ? 366 : 365)) return std::nullopt;
+    return sys_days{y / 1 / 1} + days{*day - 1};
+  }
+  const auto month = text.digits(2);
+  if (!month || !text.take('-')) return std::nullopt;
+  const auto day = text.digits(2);
+  if (!day) return std::nullopt;
+  const year_month_day date{y, std::chrono::month{static_cast<unsigned>(*month)},
+                            std::chrono::day{static_cast<unsigned>(*day)}};
+  if (!date.ok()) return std::nullopt;
+  return sys_days{date};
+}
+
+/// TAI - UTC as a day begins; 1 of `status` is a guess.
+Duration leap_seconds(sys_days day, int* status = nullptr) noexcept {
+  const year_month_day date{day};
+  double seconds = 0;
+  const int found = eraDat(static_cast<int>(date.year()), static_cast<int>(unsigned{date.month()}),
+                           static_cast<int>(unsigned{date.day()}), 0.0, &seconds);
+  if (status != nullptr) *status = found;
+  return from_seconds(seconds);
+}
+
+/// When a day of UTC begins.
+Epoch midnight_utc(sys_days day) noexcept {
+  return Epoch(Duration((day - kDayOfJ2000).count() * kDay_ns - kDay_ns / 2)) + leap_seconds(day);
+}
+
+/// The day of UTC that `t` is in.
+sys_days day_of(Epoch t) noexcept {
+  const std::int64_t since_midnight = t.time_since_epoch().count() / kSecond_ns + 43200;
+  // By TAI; UTC is behind it by less than a day.
+  const sys_days day = kDayOfJ2000 + std::chrono::floor<days>(std::chrono::seconds(since_midnight));
+  return t < midnight_utc(day) ? day - days{1} : day;
+}
 
 }  // namespace
 
-std::optional<Epoch> epoch_from_utc(const std::string& text) noexcept {
-  int year = 0;
-  int month = 0;
-  int day = 0;
-  int hour = 0;
-  int minute = 0;
-  double second = 0;
-  int used = 0;
-  const int fields = std::sscanf(text.c_str(), "%4d-%2d-%2dT%2d:%2d:%12lf%n", &year, &month, &day,
-                                 &hour, &minute, &second, &used);
-  const std::string rest = fields == 6 ? text.substr(static_cast<std::size_t>(used)) : "?";
-  if (fields != 6 || year < kFirstUtcYear || !(rest.empty() || rest == "Z")) return std::nullopt;
-  double utc1 = 0;
-  double utc2 = 0;
-  double tai1 = 0;
-  double tai2 = 0;
-  // +1 warns that the leap table ends before this year; a negative status, or a time of day past
-  // the end of that day (+2), is no date.
-  const int status = eraDtf2d("UTC", year, month, day, hour, minute, second, &utc1, &utc2);
-  if (status < 0 || status > 1 || eraUtctai(utc1, utc2, &tai1, &tai2) < 0) return std::nullopt;
-  const double days = tai1 - kJ2000Date;  // exact: both are multiples of a half
-  return Epoch(Duration(std::llround(days * kNanosecondsPerDay)) +
-               Duration(std::llround(tai2 * kNanosecondsPerDay)));
+std::optional<Epoch> epoch_from_text(std::string_view whole, TimeScale scale) noexcept {
+  DateText text(whole);
+  const auto day = read_day(text);
+  if (!day || !text.take('T')) return std::nullopt;
+  const auto hour = text.digits(2);
+  if (!hour || *hour > 23 || !text.take(':')) return std::nullopt;
+  const auto minute = text.digits(2);
+  if (!minute || *minute > 59 || !text.take(':')) return std::nullopt;
+  const auto second = text.digits(2);
+  const auto decimals = second ? text.decimals_ns() : std::nullopt;
+  if (!decimals || *second > 60) return std::nullopt;
+  if (scale == TimeScale::kUtc) static_cast<void>(text.take('Z'));
+  if (text.left() > 0) return std::nullopt;
+
+  const Duration of_day(((*hour * 60 + *minute) * 60LL + *second) * kSecond_ns + *decimals);
+  if (scale == TimeScale::kUtc) {
+    const Epoch t = midnight_utc(*day) + of_day;
+    if (*second == 60 && (*hour != 23 || *minute != 59 || t >= midnight_utc(*day + days{1})))
+      return std::nullopt;
+    return t;
+  }
+  if (*second == 60) return std::nullopt;
+  const Epoch t(Duration((*day - kDayOfJ2000).count() * kDay_ns - kDay_ns / 2) + of_day);
+  if (scale == TimeScale::kTt) return t - kTtMinusTai;
+  return scale == TimeScale::kGps ? t + kTaiMinusGps : t;
+}
+
+std::string utc_text(Epoch t, int decimals) {
+  std::int64_t unit_ns = kSecond_ns;
+  for (int i = 0; i < decimals; ++i) unit_ns /= 10;
+  sys_days day = day_of(t);
+  const Duration lasts = midnight_utc(day + days{1}) - midnight_utc(day);
+  std::int64_t units = ((t - midnight_utc(day)).count() + unit_ns / 2) / unit_ns;
+  if (units * unit_ns >= lasts.count()) {
+    day += days{1};
+    units = 0;
+  }
+  const std::int64_t of_day_s = units * unit_ns / kSecond_ns;
+  // A leap second is the sixty-first of the last minute.
+  const int minute_of_day = static_cast<int>(std::min<std::int64_t>(of_day_s / 60, 24 * 60 - 1));
+  const int second = static_cast<int>(of_day_s - 60LL * minute_of_day);
+  const year_month_day date{day};
+  char text[64];
+  int used = std::snprintf(text, sizeof text, "%04d-%02u-%02uT%02d:%02d:%02d",
+                           static_cast<int>(date.year()), unsigned{date.month()},
+                           unsigned{date.day()}, minute_of_day / 60, minute_of_day % 60, second);
+  if (decimals > 0) {
+    std::snprintf(text + used, sizeof text - static_cast<std::size_t>(used), ".%0*lld", decimals,
+                  static_cast<long long>(units % (kSecond_ns / unit_ns)));
+  }
+  return text;
+}
+
+bool utc_is_a_guess(Epoch t) noexcept {
+  int status = 0;
+  leap_seconds(day_of(t), &status);
+  return status == 1;
 }
 
 TwoPartDate utc_date(Epoch t) noexcept {
@@ -44,23 +174,9 @@ TwoPartDate utc_date(Epoch t) noexcept {
   return utc;
 }
 
-std::string utc_text(Epoch t) {
-  const TwoPartDate utc = utc_date(t);
-  int year = 0;
-  int month = 0;
-  int day = 0;
-  int clock[4] = {};
-  eraD2dtf("UTC", 3, utc.day1, utc.day2, &year, &month, &day, clock);
-  char text[40];
-  std::snprintf(text, sizeof text, "%04d-%02d-%02dT%02d:%02d:%02d.%03d", year, month, day, clock[0],
-                clock[1], clock[2], clock[3]);
-  return text;
-}
-
 TwoPartDate terrestrial_time(Epoch t) noexcept {
-  constexpr double kTtMinusTai_ns = 32.184e9;
   const double ns = static_cast<double>(t.time_since_epoch().count());
-  return {kJ2000Date, (ns + kTtMinusTai_ns) / kNanosecondsPerDay};
+  return {kJ2000Date, (ns + 32.184e9) / kNanosecondsPerDay};
 }
 
 }  // namespace engine

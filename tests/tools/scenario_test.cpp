@@ -11,6 +11,7 @@
 #include <starloop_test_paths.h>
 
 #include "engine/core/constants.h"
+#include "engine/orbit/utc.h"
 
 namespace {
 
@@ -88,6 +89,14 @@ TEST(Scenario, ThePapersPassLoads) {
   EXPECT_DOUBLE_EQ(s.actuator.rate_limit_rad_s, 2e-3);
   EXPECT_DOUBLE_EQ(s.actuator.acceleration_limit_rad_s2, 10e-3);
   EXPECT_DOUBLE_EQ(s.criteria.pointing_rms_px, 0.5);
+}
+
+TEST(Scenario, ItsEpochCanBeSetLikeAnyOtherValue) {
+  for (const char* date : {"2022-03-01T12:00:00", "2022-060T12:00:00", "2022-03-01T12:00:00Z"})
+    EXPECT_EQ(load({"scenario.epoch=" + std::string(date)}).scene.epoch,
+              engine::epoch_from_utc("2022-03-01T12:00:00").value());
+  EXPECT_EQ(load({"scenario.epoch=2016-12-31T23:59:60.5"}).scene.epoch,
+            engine::epoch_from_utc("2016-12-31T23:59:60.5").value());
 }
 
 TEST(Scenario, PointingIsWithoutFlawsUnlessItSaysOtherwise) {

@@ -30,8 +30,9 @@ engine::Epoch read_epoch(const ConfigTable& table) {
   const std::string text = table.text("epoch");
   const auto epoch = engine::epoch_from_utc(text);
   if (!epoch)
-    table.fail("epoch",
-               "must be a UTC date like 2022-01-01T00:00:00, from 1972 on, got \"" + text + "\"");
+    table.fail("epoch", "must be a UTC date like 2022-01-01T00:00:00, from " +
+                            std::to_string(engine::kFirstYear) + " to " +
+                            std::to_string(engine::kLastYear) + ", got \"" + text + "\"");
   return *epoch;
 }
 

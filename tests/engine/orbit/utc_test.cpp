@@ -1,5 +1,7 @@
 #include "engine/orbit/utc.h"
 
+#include <string>
+
 #include <gtest/gtest.h>
 
 #include "engine/core/time.h"
@@ -40,6 +42,63 @@ TEST(Utc, ReadsBackWhatItWrites) {
     EXPECT_EQ(utc_text(epoch(text)), text);
 }
 
+TEST(Utc, ReadsBackWhatItWritesToTheNanosecond) {
+  for (const char* text : {"1972-06-30T23:59:60.999999999", "2016-12-31T23:59:59.999999999",
+                           "2016-12-31T23:59:60.000000000", "2016-12-31T23:59:60.000000001",
+                           "2016-12-31T23:59:60.999999999", "2017-01-01T00:00:00.000000000",
+                           "2022-01-04T14:02:41.630163217", "2280-12-31T23:59:59.999999999"})
+    EXPECT_EQ(utc_text(epoch(text), 9), text);
+}
+
+TEST(Utc, TextsGrowWithTheNanosecondsAcrossALeapSecond) {
+  // Around both ends of the second, by the digits' own order.
+  for (const char* edge : {"2016-12-31T23:59:60", "2017-01-01T00:00:00"}) {
+    std::string before;
+    for (int ns = -1000; ns <= 1000; ++ns) {
+      const Epoch t = epoch(edge) + Duration(ns);
+      const std::string text = utc_text(t, 9);
+      ASSERT_LT(before, text) << edge << " " << ns;
+      ASSERT_EQ(epoch(text), t) << text;
+      before = text;
+    }
+  }
+}
+
+TEST(Utc, RoundsIntoALeapSecondAndOutOfIt) {
+  EXPECT_EQ(utc_text(epoch("2016-12-31T23:59:59.9996")), "2016-12-31T23:59:60.000");
+  EXPECT_EQ(utc_text(epoch("2016-12-31T23:59:60.9996")), "2017-01-01T00:00:00.000");
+  EXPECT_EQ(utc_text(epoch("2016-12-31T23:59:60.9994")), "2016-12-31T23:59:60.999");
+  EXPECT_EQ(utc_text(epoch("2016-12-31T23:59:60.4"), 0), "2016-12-31T23:59:60");
+}
+
+TEST(Utc, TakesTheDayOfTheYear) {
+  EXPECT_EQ(epoch("2022-001T00:00:00"), epoch("2022-01-01T00:00:00"));
+  EXPECT_EQ(epoch("2020-366T23:59:59.5Z"), epoch("2020-12-31T23:59:59.5"));
+  EXPECT_EQ(epoch("2016-366T23:59:60"), epoch("2016-12-31T23:59:60"));
+  for (const char* text : {"2022-000T00:00:00", "2022-366T00:00:00", "2022-1T00:00:00"})
+    EXPECT_FALSE(epoch_from_utc(text).has_value()) << text;
+}
+
+TEST(Utc, OtherScalesAreAFixedDistanceFromTai) {
+  const auto in = [](TimeScale scale) {
+    return epoch_from_text("2022-01-01T00:00:00", scale).value();
+  };
+  EXPECT_EQ(in(TimeScale::kUtc)-in(TimeScale::kTai), std::chrono::seconds(37));
+  EXPECT_EQ(in(TimeScale::kTai)-in(TimeScale::kTt), std::chrono::milliseconds(32184));
+  EXPECT_EQ(in(TimeScale::kGps)-in(TimeScale::kTai), std::chrono::seconds(19));
+  // A leap second is UTC's alone, and so is the Z.
+  for (const TimeScale scale : {TimeScale::kTai, TimeScale::kTt, TimeScale::kGps}) {
+    EXPECT_FALSE(epoch_from_text("2016-12-31T23:59:60", scale).has_value());
+    EXPECT_FALSE(epoch_from_text("2016-12-31T23:59:59Z", scale).has_value());
+  }
+}
+
+TEST(Utc, SaysWhenTheTableOfLeapSecondsIsTooOldToKnow) {
+  EXPECT_FALSE(utc_is_a_guess(epoch("2016-12-31T23:59:60")));
+  EXPECT_FALSE(utc_is_a_guess(epoch("2022-01-16T00:00:00")));
+  EXPECT_TRUE(utc_is_a_guess(epoch("2100-01-01T00:00:00")));
+}
+
 TEST(Utc, RoundsToTheNextDayAndNotToSecondSixty) {
   EXPECT_EQ(utc_text(epoch("2022-03-01T23:59:59.9996")), "2022-03-02T00:00:00.000");
 }
@@ -69,8 +128,28 @@ TEST(Utc, RefusesWhatIsNoDate) {
                            "2022-01-01T00:00:00 ",
                            "1971-12-31T23:59:59",
                            "-2022-01-01T00:00:00",
-                           "99999-01-01T00:00:00"})
+                           "99999-01-01T00:00:00",
+                           "0000-01-01T00:00:00",
+                           "2281-01-01T00:00:00",
+                           "1e9",
+                           "1000000000-01-01T00:00:00",
+                           "2022-1-1T0:0:0",
+                           "+022-01-01T00:00:00",
+                           "2022-01-01T 1:00:00",
+                           "2022-01-01T00:00:0x1",
+                           "2022-01-01T00:00:1e1",
+                           "2022-01-01T00:00:00.",
+                           "2022-01-01T00:00:00.0000000001",
+                           "2016-12-31T23:59:61",
+                           "2016-12-31T22:59:60",
+                           "2016-12-30T23:59:60",
+                           "2022-01-01T00:00:00ZZ",
+                           "NaN"})
     EXPECT_FALSE(epoch_from_utc(text).has_value()) << "\"" << text << "\"";
+  using namespace std::string_literals;
+  EXPECT_FALSE(epoch_from_utc("2022-01-01T00:00:00\0"s).has_value());
+  EXPECT_FALSE(epoch_from_utc("2022-01-01\0T00:00:00"s).has_value());
+  EXPECT_FALSE(epoch_from_utc(std::string(1 << 20, '9')).has_value());
 }
 
 TEST(TerrestrialTime, Is32184MillisecondsAheadOfTai) {
