@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <map>
+#include <optional>
 #include <set>
 #include <sstream>
 
@@ -25,6 +26,14 @@ std::string kind_text(const toml::node& node) {
   std::ostringstream out;
   out << "a value of type " << node.type();
   return out.str();
+}
+
+/// Nothing when it is none that the range holds.
+std::optional<double> number_in(const toml::node& node, const Range& range) {
+  if (!node.is_number()) return std::nullopt;
+  const double value = *node.value<double>();
+  if (!std::isfinite(value) || !range.holds(value)) return std::nullopt;
+  return value;
 }
 
 }  // namespace
@@ -184,11 +193,26 @@ void ConfigTable::fail(const std::string& key, const std::string& complaint) con
 double ConfigTable::number(const std::string& key, const Range& range) const {
   const toml::node* node = document_->find(path(key));
   if (node == nullptr) fail(key, "is missing, expected " + range.text());
-  const bool is_number = node->is_number();
-  const double value = is_number ? *node->value<double>() : 0.0;
-  if (!is_number || !std::isfinite(value) || !range.holds(value))
-    fail(key, "must be " + range.text() + ", got " + kind_text(*node));
-  return value;
+  const auto value = number_in(*node, range);
+  if (!value) fail(key, "must be " + range.text() + ", got " + kind_text(*node));
+  return *value;
+}
+
+std::vector<double> ConfigTable::numbers(const std::string& key, std::size_t count,
+                                         const Range& range) const {
+  const std::string wanted =
+      "must be a list of " + std::to_string(count) + " numbers, each " + range.text();
+  if (!has(key)) fail(key, "is missing: it " + wanted);
+  const toml::array* list = document_->find(path(key))->as_array();
+  if (list == nullptr) fail(key, wanted + ", got " + kind_text(*document_->find(path(key))));
+  if (list->size() != count) fail(key, wanted + ", got " + std::to_string(list->size()));
+  std::vector<double> all;
+  for (const toml::node& node : *list) {
+    const auto value = number_in(node, range);
+    if (!value) fail(key, wanted + ", got in it " + kind_text(node));
+    all.push_back(*value);
+  }
+  return all;
 }
 
 double ConfigTable::number_or(const std::string& key, double fallback, const Range& range) const {

@@ -95,6 +95,9 @@ class ConfigTable {
                                         const Range& range) const;
   [[nodiscard]] std::string text(const std::string& key) const;
   [[nodiscard]] std::string text_or(const std::string& key, const std::string& fallback) const;
+  /// A list of just so many numbers.
+  [[nodiscard]] std::vector<double> numbers(const std::string& key, std::size_t count,
+                                            const Range& range) const;
   /// A text, or a list of texts; empty when it is not there.
   [[nodiscard]] std::vector<std::string> texts(const std::string& key) const;
   [[nodiscard]] bool flag_or(const std::string& key, bool fallback) const;  ///< true or false

@@ -151,14 +151,12 @@ std::string utc_text(Epoch t, int decimals) {
   const int second = static_cast<int>(of_day_s - 60LL * minute_of_day);
   const year_month_day date{day};
   char text[64];
-  int used = std::snprintf(text, sizeof text, "%04d-%02u-%02uT%02d:%02d:%02d",
-                           static_cast<int>(date.year()), unsigned{date.month()},
-                           unsigned{date.day()}, minute_of_day / 60, minute_of_day % 60, second);
-  if (decimals > 0) {
-    std::snprintf(text + used, sizeof text - static_cast<std::size_t>(used), ".%0*lld", decimals,
-                  static_cast<long long>(units % (kSecond_ns / unit_ns)));
-  }
-  return text;
+  const int used = std::snprintf(text, sizeof text, "%04d-%02u-%02uT%02d:%02d:%02d.%09lld",
+                                 static_cast<int>(date.year()), unsigned{date.month()},
+                                 unsigned{date.day()}, minute_of_day / 60, minute_of_day % 60,
+                                 second, static_cast<long long>(units * unit_ns % kSecond_ns));
+  const int unwanted = decimals > 0 ? 9 - decimals : 10;  // with their point
+  return std::string(text, static_cast<std::size_t>(used - unwanted));
 }
 
 bool utc_is_a_guess(Epoch t) noexcept {

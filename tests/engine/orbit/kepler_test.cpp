@@ -109,6 +109,94 @@ TEST(SolveKepler, StaysInTheTurnForAnyFiniteMeanAnomaly) {
   EXPECT_EQ(solve_kepler(0.5, kPi).rad, kPi);
 }
 
+TEST(SolveKepler, SaysWhetherItConverged) {
+  for (const double e : kEccentricities)
+    for (const double m : mean_anomalies())
+      ASSERT_TRUE(solve_kepler(e, m).converged) << "e " << e << " M " << m;
+  for (const double m : {0.0, -0.0, kPi, 1e9}) EXPECT_TRUE(solve_kepler(0.5, m).converged) << m;
+  for (const double m : {std::nan(""), HUGE_VAL}) {
+    EXPECT_FALSE(solve_kepler(0.5, m).converged) << m;
+    EXPECT_FALSE(solve_hyperbolic_kepler(1.5, m).converged) << m;
+  }
+}
+
+/// The same for M = e sinh H - H, without the cancellation near the parabola. Pre: m > 0.
+long double bisected_hyperbola(double e, double m) {
+  const auto rest = [](long double x) {
+    if (x > 0.5L) return std::sinh(x) - x;
+    long double term = x * x * x / 6.0L;
+    long double sum = term;
+    for (int n = 4; n <= 30; n += 2) {
+      term *= x * x / (static_cast<long double>(n) * (n + 1));
+      sum += term;
+    }
+    return sum;
+  };
+  const long double e_long = e;
+  long double low = 0.0L;
+  long double high = 1.0L + std::asinh(static_cast<long double>(m) / (e_long - 1.0L));
+  for (int i = 0; i < 300 && low < high; ++i) {
+    const long double middle = 0.5L * (low + high);
+    if (middle <= low || middle >= high) break;
+    const long double f = (e_long - 1.0L) * middle + e_long * rest(middle) - m;
+    (f > 0.0L ? high : low) = middle;
+  }
+  return 0.5L * (low + high);
+}
+
+constexpr std::array<double, 12> kHyperbolas{
+    1 + 1e-12, 1 + 1e-10, 1 + 1e-8, 1.0000001, 1.0001, 1.01, 1.25, 1.5, 3.0, 30.0, 3200.0, 1e6};
+
+std::vector<double> hyperbolic_mean_anomalies() {
+  constexpr int kCount = 4000;
+  std::vector<double> all;
+  for (int i = 0; i < kCount; ++i) all.push_back(std::pow(10.0, -12.0 + 22.0 * i / kCount));
+  return all;
+}
+
+TEST(SolveHyperbolicKepler, AgreesWithBisectionFromTheParabolaToTheStraightLine) {
+  for (const double e : kHyperbolas) {
+    for (const double m : hyperbolic_mean_anomalies()) {
+      const EccentricAnomaly found = solve_hyperbolic_kepler(e, m);
+      const auto truth = static_cast<double>(bisected_hyperbola(e, m));
+      ASSERT_NEAR(found.rad / truth, 1.0, 1e-13) << "e " << e << " M " << m;
+      ASSERT_LE(found.iterations, 6) << "e " << e << " M " << m;
+      ASSERT_TRUE(found.converged);
+      ASSERT_EQ(solve_hyperbolic_kepler(e, -m).rad, -found.rad);
+    }
+  }
+}
+
+TEST(SolveHyperbolicKepler, ReproducesRootsOf60DigitBisection) {
+  // The inputs are the nearest doubles: near the parabola those of the decimals differ by 4e-13.
+  const auto h = [](double e, double m) { return solve_hyperbolic_kepler(e, m).rad; };
+  EXPECT_NEAR(h(1.0000001, 1e-6) / .0181600991440439817, 1.0, 1e-13);
+  EXPECT_NEAR(h(1.5, 3.0) / 1.89945594577961282, 1.0, 1e-13);
+  EXPECT_NEAR(h(3200.0, 1e5) / 4.13546379112105858, 1.0, 1e-13);
+  EXPECT_NEAR(h(1.0000001, 50.0) / 4.69500299126896722, 1.0, 1e-13);
+}
+
+TEST(SolveHyperbolicKepler, HasAnAnswerForAnyFiniteMeanAnomaly) {
+  for (const double e : kHyperbolas) {
+    EXPECT_EQ(solve_hyperbolic_kepler(e, 0.0).rad, 0.0);
+    EXPECT_TRUE(std::signbit(solve_hyperbolic_kepler(e, -0.0).rad));
+    for (const double m : {5e-324, 1e-300, 1e9, 1e15, 1e300, 1.7e308}) {
+      const EccentricAnomaly found = solve_hyperbolic_kepler(e, m);
+      EXPECT_TRUE(std::isfinite(found.rad) && found.rad >= 0.0 && found.converged) << e << " " << m;
+    }
+  }
+}
+
+TEST(MeanAnomaly, IsKeplersEquationReadTheOtherWay) {
+  for (const double m : mean_anomalies()) {
+    for (const double e : kEccentricities)
+      ASSERT_NEAR(mean_anomaly_rad(e, solve_kepler(e, m).rad) / m, 1.0, 2e-13) << e << " " << m;
+    for (const double e : kHyperbolas)
+      ASSERT_NEAR(mean_anomaly_rad(e, solve_hyperbolic_kepler(e, m).rad) / m, 1.0, 4e-13)
+          << e << " " << m;
+  }
+}
+
 TEST(KeplerPropagator, AgreesWithThe25DigitReference) {
   const test_support::Flyby flyby;
   const Csv reference("orbits_reference.csv");
@@ -172,36 +260,43 @@ TEST(KeplerPropagator, GoesBackTheWayItCame) {
   }
 }
 
-ConfigReader orbit_text(const std::string& changed) {
-  return ConfigReader::from_text(
-      "[o]\nsemi_major_axis_km = 7000\neccentricity = 0.01\ninclination_deg = 10\n"
-      "argument_of_perigee_deg = 1\nraan_deg = 2\nmean_anomaly_deg = 3\n" +
-          changed,
-      "x.toml");
+TEST(KeplerPropagator, FollowsAHyperbolaThatKeepsEnergyAndAngularMomentum) {
+  const Epoch epoch = test_support::epoch_2022();
+  for (const double e : {1.0001, 1.2, 5.0}) {
+    const double a_m = -7e6 / (e - 1.0);
+    const KeplerPropagator orbit({a_m, e, 1.0, 0.3, 2.0, 0.0}, epoch);
+    const OrbitState perigee = orbit.at(epoch);
+    EXPECT_NEAR(perigee.position.m.norm(), 7e6, 1e-6);
+    const Eigen::Vector3d spin = perigee.position.m.cross(perigee.velocity.m_s);
+    for (double t_s = -1e5; t_s <= 1e5; t_s += 3e3) {
+      const OrbitState s = orbit.at(epoch + from_seconds(t_s));
+      const double r_m = s.position.m.norm();
+      const double energy = 0.5 * s.velocity.m_s.squaredNorm() - kEarthMu_m3_s2 / r_m;
+      // Against what cancels in them; near the parabola the place itself is a small difference of
+      // parts as long as the axis.
+      const double rounding = 4e-15 + 4.0 * 0x1p-53 * std::abs(a_m) / r_m;
+      const double parts = 0.5 * s.velocity.m_s.squaredNorm() + kEarthMu_m3_s2 / r_m;
+      EXPECT_LT(std::abs(energy + 0.5 * kEarthMu_m3_s2 / a_m), rounding * parts) << e;
+      EXPECT_LT((s.position.m.cross(s.velocity.m_s) - spin).norm(),
+                rounding * r_m * s.velocity.m_s.norm())
+          << e;
+      // The velocity is how the place changes: third differences of a second leave 1e-5 m/s.
+      const Eigen::Vector3d moved = orbit.at(epoch + from_seconds(t_s + 0.5)).position.m -
+                                    orbit.at(epoch + from_seconds(t_s - 0.5)).position.m;
+      EXPECT_LT((moved - s.velocity.m_s).norm(), 1e-3) << e << " " << t_s;
+    }
+  }
 }
 
-TEST(ReadElements, TakesDegreesAndKilometres) {
-  const ConfigReader config = orbit_text("");
-  const KeplerElements read = read_elements(config.table("o"));
-  EXPECT_DOUBLE_EQ(read.semi_major_axis_m, 7e6);
-  EXPECT_DOUBLE_EQ(read.inclination_rad, 10.0 * kDegree);
-  EXPECT_DOUBLE_EQ(read.mean_anomaly_rad, 3.0 * kDegree);
-}
-
-TEST(ReadElements, RefusesWhatIsNoEllipseAboutTheEarth) {
-  const auto refuses = [](const std::string& assignment) {
-    ConfigReader config = orbit_text("");
-    config.set(assignment);
-    EXPECT_THROW(static_cast<void>(read_elements(config.table("o"))), ConfigError) << assignment;
-  };
-  refuses("o.eccentricity=1.0");
-  refuses("o.eccentricity=-0.1");
-  refuses("o.eccentricity=0.5");  // perigee inside the Earth
-  refuses("o.semi_major_axis_km=-7000");
-  refuses("o.semi_major_axis_km=7000000000000000000000e300");
-  refuses("o.semi_major_axis_km=nan");
-  refuses("o.inclination_deg=181");
-  refuses("o.mean_anomaly_deg=\"3\"");
+TEST(KeplerPropagator, IsNeverFasterThanItsBoundAndReachesIt) {
+  const Epoch epoch = test_support::epoch_2022();
+  for (const double e : {0.0, 0.0067, 0.7, 1.0001, 3.0}) {
+    const KeplerPropagator orbit({7e6 / (1.0 - e), e, 1.0, 0.3, 2.0, 0.0}, epoch);
+    const double bound = orbit.speed_bound_m_s();
+    for (double t_s = -6e3; t_s <= 6e3; t_s += 100.0)
+      EXPECT_LE(orbit.at(epoch + from_seconds(t_s)).velocity.m_s.norm(), bound) << e << " " << t_s;
+    EXPECT_NEAR(orbit.at(epoch).velocity.m_s.norm() / bound, 1.0, 1e-8) << e;
+  }
 }
 
 }  // namespace
