@@ -21,6 +21,7 @@ class HeldOffset final : public Propagator {
   HeldOffset(const Propagator& leader, const OrbitalOffset& offset) noexcept;
 
   [[nodiscard]] OrbitState at(Epoch t) const noexcept override;
+  [[nodiscard]] EpochSpan span() const noexcept override { return leader_.span(); }
 
  private:
   const Propagator& leader_;

@@ -23,7 +23,7 @@ CompanionSpec read_companion(const ConfigReader& config, const std::string& name
   const bool held = table.has("radial_m") || table.has("along_m") || table.has("cross_m");
   if (table.has("orbit")) {
     if (held) table.fail("orbit", "and radial_m, along_m, cross_m exclude each other");
-    spec.orbit = read_elements(config.table(path + ".orbit"));
+    spec.orbit = read_orbit(config.table(path + ".orbit"));
     return spec;
   }
   if (!held) {

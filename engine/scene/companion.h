@@ -7,7 +7,7 @@
 #include "engine/core/config_reader.h"
 #include "engine/orbit/attitude.h"
 #include "engine/orbit/held_offset.h"
-#include "engine/orbit/kepler.h"
+#include "engine/orbit/orbit_spec.h"
 #include "engine/scene/snapshot.h"
 
 namespace engine {
@@ -16,10 +16,10 @@ namespace engine {
 struct CompanionSpec {
   std::string name;
   std::string mesh = "telescope";
-  std::string mesh_where;               ///< the place in the scenario that names it
-  std::optional<KeplerElements> orbit;  ///< none: it is held beside the target
-  OrbitalOffset offset;                 ///< where it has no orbit of its own
-  EulerOffsets attitude;  ///< from its own orbital frame, or the target's where it is held
+  std::string mesh_where;          ///< the place in the scenario that names it
+  std::optional<OrbitSpec> orbit;  ///< none: it is held beside the target
+  OrbitalOffset offset;            ///< where it has no orbit of its own
+  EulerOffsets attitude;           ///< from its own orbital frame, or the target's where it is held
 };
 /// Reads companions.<name> for each name below `companions`, kMostCompanions at most.
 [[nodiscard]] std::vector<CompanionSpec> read_companions(const ConfigReader& config);

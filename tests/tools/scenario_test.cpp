@@ -1,6 +1,7 @@
 #include "tools/starloop/scenario.h"
 
 #include <cmath>
+#include <cstdio>
 #include <fstream>
 #include <optional>
 #include <sstream>
@@ -11,6 +12,7 @@
 #include <starloop_test_paths.h>
 
 #include "engine/core/constants.h"
+#include "engine/orbit/kepler.h"
 #include "engine/orbit/utc.h"
 
 namespace {
@@ -80,7 +82,7 @@ TEST(Scenario, ThePapersPassLoads) {
   EXPECT_EQ(s.run.exposure, engine::Duration(1'000'000));
   EXPECT_EQ(s.run.period, engine::Duration(100'000'000));
   EXPECT_EQ(s.run.command_lead, engine::Duration(10'000'000));
-  EXPECT_DOUBLE_EQ(s.camera_orbit.semi_major_axis_m, 6868.8546e3);
+  EXPECT_DOUBLE_EQ(s.camera_orbit.elements.semi_major_axis_m, 6868.8546e3);
   EXPECT_DOUBLE_EQ(s.scene.camera.pixel_pitch_m, 6.5e-6);
   EXPECT_EQ(s.scene.camera.width_px, 1024);
   EXPECT_EQ(s.detector.bits, 11);
@@ -97,6 +99,54 @@ TEST(Scenario, ItsEpochCanBeSetLikeAnyOtherValue) {
               engine::epoch_from_utc("2022-03-01T12:00:00").value());
   EXPECT_EQ(load({"scenario.epoch=2016-12-31T23:59:60.5"}).scene.epoch,
             engine::epoch_from_utc("2016-12-31T23:59:60.5").value());
+}
+
+TEST(Scenario, BothBodiesMayMoveOverAnOblateEarth) {
+  const Scenario s = load({"orbit.camera.propagator=j2", "orbit.target.propagator=j2"});
+  const auto camera = starloop::propagator_of(s, s.camera_orbit);
+  const auto target = starloop::propagator_of(s, s.target_orbit);
+  const std::vector<engine::Pass> passes = starloop::passes_of(s);
+  ASSERT_FALSE(passes.empty());
+  for (const engine::Pass& pass : passes) {
+    const engine::Epoch t = s.scene.epoch + pass.closest.time_since_epoch();
+    EXPECT_EQ((target->at(t).position.m - camera->at(t).position.m).norm(), pass.min_range_m);
+  }
+  // No two-body pass is at its time.
+  const std::vector<engine::Pass> others = starloop::passes_of(load());
+  for (const engine::Pass& pass : passes)
+    for (const engine::Pass& other : others)
+      EXPECT_GT(std::abs(engine::seconds(pass.closest - other.closest)), 60.0);
+}
+
+TEST(Scenario, AnOrbitMayBeAState) {
+  const Scenario of_elements = load();
+  const engine::OrbitState state =
+      starloop::propagator_of(of_elements, of_elements.camera_orbit)->at(of_elements.scene.epoch);
+  std::string text = flyby_text();
+  const std::size_t from = text.find("[orbit.camera]");
+  const std::size_t to = text.find("[orbit.target]");
+  char orbit[400];
+  std::snprintf(orbit, sizeof orbit,
+                "[orbit.camera]\nposition_km = [%.12f, %.12f, %.12f]\nvelocity_km_s = [%.15f, "
+                "%.15f, %.15f]\n",
+                state.position.m.x() * 1e-3, state.position.m.y() * 1e-3,
+                state.position.m.z() * 1e-3, state.velocity.m_s.x() * 1e-3,
+                state.velocity.m_s.y() * 1e-3, state.velocity.m_s.z() * 1e-3);
+  text.replace(from, to - from, orbit);
+  const Scenario s = starloop::read_scenario(ConfigReader::from_text(text, "x.toml"));
+  // The state's last digits, 1e-9 m and 1e-12 m/s, after three and a half days.
+  EXPECT_NEAR(engine::seconds(starloop::chosen_pass(s).closest),
+              engine::seconds(starloop::chosen_pass(of_elements).closest), 1e-6);
+}
+
+TEST(Scenario, FramesAreWantedWithinWhatIsIntegrated) {
+  Scenario s = load({"orbit.camera.propagator=j2", "visibility.span_days=0.1"});
+  starloop::want_frames(s, engine::sim_time(86400.0), engine::sim_time(2 * 86400.0));
+  const auto camera = starloop::propagator_of(s, s.camera_orbit);
+  EXPECT_GE(camera->span().end, s.scene.epoch + engine::from_seconds(2 * 86400.0));
+  const auto late =
+      complaint([&] { starloop::want_frames(s, engine::sim_time(0.0), engine::sim_time(9e9)); });
+  ASSERT_TRUE(late.has_value());
 }
 
 TEST(Scenario, PointingIsWithoutFlawsUnlessItSaysOtherwise) {
@@ -212,7 +262,7 @@ const std::vector<BadValue> kBadValues = {
     {"scenario.name=7", "scenario.name", "must be text"},
     {"scenario.seed=-1", "scenario.seed", "got -1"},
     {"scenario.light_path=curved", "scenario.light_path", "must be one of"},
-    {"orbit.camera.eccentricity=1.0", "orbit.camera.eccentricity", "must be >= 0 and < 1, got 1"},
+    {"orbit.camera.eccentricity=1.0", "orbit.camera.eccentricity", "must not be that of a parabola"},
     {"orbit.target.inclination_deg=181", "orbit.target.inclination_deg", "got 181"},
     {"camera.width_px=8", "camera.width_px", "got 8"},
     {"camera.height_px=4097", "camera.height_px", "got 4097"},
@@ -439,8 +489,8 @@ TEST(Scenario, CloseUpsCameraCirclesItsTargetAtOneDistance) {
   CommonOptions options;
   options.file = STARLOOP_SOURCE_DIR "/config/close_up.toml";
   const Scenario scenario = starloop::load_scenario(options);
-  const engine::KeplerPropagator camera(scenario.camera_orbit, scenario.scene.epoch);
-  const engine::KeplerPropagator target(scenario.target_orbit, scenario.scene.epoch);
+  const engine::KeplerPropagator camera(scenario.camera_orbit.elements, scenario.scene.epoch);
+  const engine::KeplerPropagator target(scenario.target_orbit.elements, scenario.scene.epoch);
   const engine::Pass pass = starloop::chosen_pass(scenario);
   for (int minute = 0; minute < 50; ++minute) {
     const engine::Epoch t =
@@ -457,9 +507,9 @@ TEST(Scenario, FormationsCourierPassesThroughTheLineOfSightAndThenTheSunlight) {
   const Scenario scenario = starloop::load_scenario(options);
   ASSERT_EQ(starloop::companion_names(scenario), (std::vector<std::string>{"courier", "escort"}));
   const engine::Epoch epoch = scenario.scene.epoch;
-  const engine::KeplerPropagator camera(scenario.camera_orbit, epoch);
-  const engine::KeplerPropagator target(scenario.target_orbit, epoch);
-  const engine::KeplerPropagator courier(scenario.companions[0].orbit.value(), epoch);
+  const engine::KeplerPropagator camera(scenario.camera_orbit.elements, epoch);
+  const engine::KeplerPropagator target(scenario.target_orbit.elements, epoch);
+  const engine::KeplerPropagator courier(scenario.companions[0].orbit.value().elements, epoch);
   EXPECT_LT(starloop::chosen_pass(scenario).start, engine::sim_time(80.0));
   // How far it is from a line that leaves the target towards somewhere.
   const auto beside_m = [&](double t_s, bool sun) {

@@ -9,6 +9,7 @@
 #include "drivers/usb_packet.h"
 #include "engine/core/random.h"
 #include "engine/detector/noise_lanes.h"
+#include "engine/orbit/kepler.h"
 #include "engine/orbit/sun_track.h"
 #include "tools/starloop/scenario.h"
 

@@ -117,6 +117,16 @@ int run_command(int argc, char** argv) {
   stages_app->add_option("--out", stages.out, "PNG of all four; a FITS of each goes beside it")
       ->capture_default_str();
 
+  starloop::OrbitsOptions orbits;
+  CLI::App* orbits_app = app.add_subcommand(
+      "orbits", "Write how far the models of motion are from a reference, and draw it");
+  add_common(*orbits_app, common);
+  orbits_app->add_option("--reference", orbits.reference,
+                         "CSV with columns body (camera or target), t_s, x_km, y_km, z_km; "
+                         "default: the models against the scenario's own");
+  orbits_app->add_option("-o,--out", orbits.out, "folder that gets orbits.csv and orbits.png")
+      ->capture_default_str();
+
   starloop::MtfOptions mtf;
   CLI::App* mtf_app = app.add_subcommand(
       "mtf", "Write the terms of the optics' transfer function and their product, and draw them");
@@ -167,6 +177,7 @@ int run_command(int argc, char** argv) {
   if (run_app->parsed()) return starloop::run_pass(common, run);
   if (soak_app->parsed()) return starloop::soak(common, soak);
   if (replay_app->parsed()) return starloop::replay_log(replay);
+  if (orbits_app->parsed()) return starloop::compare_orbits(common, orbits);
   if (mtf_app->parsed()) return starloop::export_mtf(common, mtf);
   if (stages_app->parsed()) return starloop::render_stages(common, stages);
   if (bench_app->parsed()) return starloop::characterize_camera(common, bench_folder);

@@ -108,6 +108,7 @@ int export_mtf(const CommonOptions& options, const MtfOptions& mtf) {
   Scenario scenario = load_scenario(options);
   const double time_s =
       mtf.time_s >= 0.0 ? mtf.time_s : engine::seconds(chosen_pass(scenario).closest);
+  want_frames(scenario, engine::sim_time(time_s), engine::sim_time(time_s));
   scenario.run.pattern = true;  // no renderer is wanted, only where things are
   const Rig rig(scenario, 1);
   const engine::Snapshot snapshot =

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -6,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "engine/core/constants.h"
+#include "tools/starloop/orbit_notes.h"
 #include "tools/starloop/pass_report.h"
 #include "tools/starloop/plot_script.h"
 #include "tools/starloop/subcommands.h"
@@ -72,6 +74,15 @@ std::size_t chosen_number(const PassReport& report, const Scenario& scenario, st
   return asked > 0 ? asked : std::min(scenario.run.pass, count);
 }
 
+/// Of the pass that is looked at.
+void print_notes(const Scenario& scenario, const PassReport& report, std::size_t number) {
+  const engine::SimTime when =
+      number == 0 ? engine::SimTime{} : report.passes()[number - 1].pass.closest;
+  for (const std::string& note : orbit_notes(scenario, when)) std::printf("%s\n", note.c_str());
+  if (const std::string note = leap_second_note(scenario); !note.empty())
+    std::fprintf(stderr, "%s\n", note.c_str());
+}
+
 }  // namespace
 
 int list_passes(const CommonOptions& options, const PassesOptions& passes) {
@@ -100,6 +111,7 @@ int list_passes(const CommonOptions& options, const PassesOptions& passes) {
       "at TCA. Earth: how long it is behind the target.\n");
   if (!passes.out.empty()) std::printf("%s: tables and pictures\n", passes.out.c_str());
   if (!drawn) std::printf("no picture: /usr/bin/python3 with matplotlib did not draw it\n");
+  print_notes(scenario, report, number);
   return kGood;
 }
 

@@ -9,6 +9,7 @@
 #include "engine/orbit/utc.h"
 #include "tools/starloop/budget_table.h"
 #include "tools/starloop/frame_sheet.h"
+#include "tools/starloop/orbit_notes.h"
 #include "tools/starloop/picture.h"
 #include "tools/starloop/subcommands.h"
 
@@ -130,6 +131,8 @@ int render_frames(const CommonOptions& options, const RenderOptions& render) {
   Scenario scenario = load_scenario(options);
   // What a run gathers over its frames these have from the beginning.
   scenario.render.settled = true;
+  const auto [first, last] = std::minmax_element(render.times_s.begin(), render.times_s.end());
+  want_frames(scenario, engine::sim_time(*first), engine::sim_time(*last));
   const std::filesystem::path out(render.out);
   const std::string sheet_png = std::filesystem::path(out).replace_extension(".png").string();
   const bool several = render.times_s.size() > 1;
@@ -151,9 +154,14 @@ int render_frames(const CommonOptions& options, const RenderOptions& render) {
     write_png(png, frame, scenario.detector.bits);
     budgets.add(i, FrameBudget(scenario, report.light));
     sheet.add(frame, report.truth.target_px, label_of(time_s, report.truth));
+    if (!options.quiet)
+      for (const std::string& note : orbit_notes(scenario, shot.shutter_open))
+        std::printf("%s\n", note.c_str());
     if (!options.quiet) tell(fits.string(), png, scenario, rig.star_text(), report);
   }
   budgets.close();
+  if (const std::string note = leap_second_note(scenario); !note.empty())
+    std::fprintf(stderr, "%s\n", note.c_str());
   if (several) {
     sheet.write(sheet_png);
     if (!options.quiet) std::printf("%s: all of them\n", sheet_png.c_str());

@@ -5,6 +5,7 @@
 #include "engine/orbit/utc.h"
 #include "tools/starloop/flight.h"
 #include "tools/starloop/observer.h"
+#include "tools/starloop/orbit_notes.h"
 #include "tools/starloop/subcommands.h"
 #include "tools/starloop/verdict.h"
 
@@ -25,6 +26,8 @@ void introduce(const Flight::Plan& plan, const Rig& rig, const Flight& flight) {
       seconds(pass.end), pass.min_range_m * 1e-3,
       pass.truncated() ? " (goes on beyond the search)" : "", rig.triangles(), rig.threads(),
       plan.open_loop ? "; open loop" : "");
+  for (const std::string& note : orbit_notes(scenario, pass.closest)) spdlog::info("{}", note);
+  if (const std::string note = leap_second_note(scenario); !note.empty()) spdlog::warn("{}", note);
   if (!rig.star_text().empty()) spdlog::info("{}", rig.star_text());
   spdlog::info("{}", flight.text());
 }

@@ -252,8 +252,8 @@ Scenario read_scenario(const ConfigReader& config) {
   s.criteria = {criteria.number_or("pointing_rms_px", 0.0, engine::at_least(0.0)),
                 criteria.number_or("after_s", 0.0, engine::at_least(0.0)),
                 hil::read_criteria(criteria)};
-  s.camera_orbit = engine::read_elements(config.table("orbit.camera"));
-  s.target_orbit = engine::read_elements(config.table("orbit.target"));
+  s.camera_orbit = engine::read_orbit(config.table("orbit.camera"));
+  s.target_orbit = engine::read_orbit(config.table("orbit.target"));
 
   s.scene.camera = engine::read_camera_geometry(config.table("camera"));
   s.scene.sun = engine::read_sun(config.table("sun"));
@@ -355,9 +355,9 @@ Rig::Rig(const Scenario& scenario, int threads)
       roll_(scenario.roll),
       boresight_(scenario.boresight),
       slow_vibration_(scenario.slow_vibration, scenario.scene.seed, engine::SimTime{}),
-      camera_(scenario.camera_orbit, epoch_),
-      target_(scenario.target_orbit, epoch_),
-      believed_target_(target_, scenario.target_knowledge),
+      camera_(propagator_of(scenario, scenario.camera_orbit)),
+      target_(propagator_of(scenario, scenario.target_orbit)),
+      believed_target_(*target_, scenario.target_knowledge),
       pool_(worker_threads(threads)) {
   if (scenario.run.pattern) {
     generator_ = std::make_unique<PatternGenerator>(scenario.detector.bits);
@@ -395,7 +395,7 @@ Rig::Stages Rig::make_stages(const Scenario& scenario) {
                           engine::StarLight(detector.mean_wavelength_m)),
         optics.splat(), detector);
   }
-  return {engine::SnapshotBuilder(scene, camera_, target_, move_companions(scenario)),
+  return {engine::SnapshotBuilder(scene, *camera_, *target_, move_companions(scenario)),
           engine::make_renderer(render, bodies.front(), pool_, {bodies.begin() + 1, bodies.end()}),
           std::move(optics), std::move(stars)};
 }
@@ -404,12 +404,12 @@ std::vector<engine::Companion> Rig::move_companions(const Scenario& scenario) {
   std::vector<engine::Companion> moving;
   for (const engine::CompanionSpec& spec : scenario.companions) {
     if (spec.orbit) {
-      companions_.push_back(std::make_unique<engine::KeplerPropagator>(*spec.orbit, epoch_));
+      companions_.push_back(propagator_of(scenario, *spec.orbit));
     } else {
-      companions_.push_back(std::make_unique<engine::HeldOffset>(target_, spec.offset));
+      companions_.push_back(std::make_unique<engine::HeldOffset>(*target_, spec.offset));
     }
     const engine::Propagator& place = *companions_.back();
-    const engine::Propagator& upright = spec.orbit ? place : target_;
+    const engine::Propagator& upright = spec.orbit ? place : *target_;
     moving.push_back({place, upright, spec.attitude});
   }
   return moving;
@@ -425,11 +425,11 @@ engine::Shot Rig::predicted_shot(engine::SimTime open, engine::Duration exposure
 }
 
 hil::ScriptedPointing Rig::prediction() const {
-  return {camera_, target_, epoch_, path_, roll_, boresight_};
+  return {*camera_, *target_, epoch_, path_, roll_, boresight_};
 }
 
 hil::ScriptedPointing Rig::believed() const {
-  return {camera_, believed_target_, epoch_, path_, roll_, boresight_};
+  return {*camera_, believed_target_, epoch_, path_, roll_, boresight_};
 }
 
 hil::ClosedLoopPointing make_pointing(const Scenario& scenario, const Rig& rig,
@@ -444,11 +444,49 @@ hil::ClosedLoopPointing make_pointing(const Scenario& scenario, const Rig& rig,
   return {rig.believed(), spec, hil::Jitter(scenario.jitter, spec.seed, start)};
 }
 
+std::unique_ptr<const engine::Propagator> propagator_of(const Scenario& scenario,
+                                                        const engine::OrbitSpec& orbit) {
+  const engine::Epoch epoch = scenario.scene.epoch;
+  const Duration lasts = std::max(scenario.search_span, scenario.latest.time_since_epoch());
+  return engine::make_propagator(orbit, epoch, {epoch, epoch + lasts});
+}
+
+namespace {
+
+/// Frames by shutters that open in between, light's way and guidance that aims ahead included.
+void need_orbits(const Scenario& scenario, engine::SimTime first, engine::SimTime last) {
+  constexpr Duration kNearlyFull = Duration::max() - std::chrono::hours(2 * 8766);
+  const Duration begun = std::max(scenario.scene.epoch.time_since_epoch(), Duration{});
+  if (last.time_since_epoch() > kNearlyFull - begun)
+    throw engine::ConfigError("--time is too late: an epoch holds 292 years from 2000 on");
+  // Light's way from as far as anything is seen in Earth orbit.
+  constexpr Duration kLightTime{1'000'000'000};
+  const Duration apparent =
+      scenario.scene.light_path == engine::LightPath::kApparent ? kLightTime : Duration{};
+  const Duration ahead = from_seconds(scenario.target_knowledge.ahead_s);
+  const engine::Epoch begin = scenario.scene.epoch + first.time_since_epoch();
+  const engine::Epoch end = scenario.scene.epoch + last.time_since_epoch() + scenario.run.exposure;
+  engine::need_span(scenario.camera_orbit, {begin, end});
+  engine::need_span(scenario.target_orbit, {begin - apparent + std::min(ahead, Duration{}),
+                                            end + std::max(ahead, Duration{})});
+  for (const engine::CompanionSpec& companion : scenario.companions)
+    if (companion.orbit) engine::need_span(*companion.orbit, {begin - apparent, end});
+}
+
+}  // namespace
+
+void want_frames(Scenario& scenario, engine::SimTime first, engine::SimTime last) {
+  need_orbits(scenario, first, last);
+  scenario.latest = std::max(scenario.latest, last + scenario.run.exposure);
+}
+
 std::vector<engine::Pass> passes_of(const Scenario& scenario) {
   const engine::Epoch epoch = scenario.scene.epoch;
-  const engine::KeplerPropagator camera(scenario.camera_orbit, epoch);
-  const engine::KeplerPropagator target(scenario.target_orbit, epoch);
-  return engine::find_passes(camera, target, scenario.visibility, epoch, engine::SimTime{},
+  for (const engine::OrbitSpec* orbit : {&scenario.camera_orbit, &scenario.target_orbit})
+    engine::need_span(*orbit, {epoch, epoch + scenario.search_span});
+  const auto camera = propagator_of(scenario, scenario.camera_orbit);
+  const auto target = propagator_of(scenario, scenario.target_orbit);
+  return engine::find_passes(*camera, *target, scenario.visibility, epoch, engine::SimTime{},
                              engine::SimTime{scenario.search_span});
 }
 
@@ -459,7 +497,9 @@ engine::Pass chosen_pass(const Scenario& scenario) {
         scenario.run.pass_where + " must be one of the " + std::to_string(passes.size()) +
         " passes that these orbits have, got " + std::to_string(scenario.run.pass));
   }
-  return passes[scenario.run.pass - 1];
+  const engine::Pass& pass = passes[scenario.run.pass - 1];
+  need_orbits(scenario, pass.start, pass.end);
+  return pass;
 }
 
 }  // namespace starloop

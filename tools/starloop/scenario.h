@@ -7,8 +7,9 @@
 
 #include "drivers/open_link.h"
 #include "engine/imaging_chain.h"
-#include "engine/orbit/kepler.h"
+#include "engine/orbit/orbit_spec.h"
 #include "engine/orbit/passes.h"
+#include "engine/orbit/visibility.h"
 #include "engine/render/render_spec.h"
 #include "engine/scene/brdf.h"
 #include "hil/closed_loop_pointing.h"
@@ -63,10 +64,11 @@ struct Scenario {
   std::string name;
   RunSpec run;
   Criteria criteria;
-  engine::KeplerElements camera_orbit;
-  engine::KeplerElements target_orbit;
+  engine::OrbitSpec camera_orbit;
+  engine::OrbitSpec target_orbit;
   engine::VisibilitySpec visibility;
   engine::Duration search_span{};
+  engine::SimTime latest{};  ///< of all times, where frames after the search are wanted
   engine::SceneSpec scene;
   std::string mesh;
   std::string mesh_where;  ///< the place in the scenario that names it
@@ -148,8 +150,8 @@ class Rig {
   [[nodiscard]] engine::Shot predicted_shot(engine::SimTime open, engine::Duration exposure) const;
   /// As far as the target's orbit is known.
   [[nodiscard]] hil::ScriptedPointing believed() const;
-  [[nodiscard]] const engine::KeplerPropagator& camera() const noexcept { return camera_; }
-  [[nodiscard]] const engine::KeplerPropagator& target() const noexcept { return target_; }
+  [[nodiscard]] const engine::Propagator& camera() const noexcept { return *camera_; }
+  [[nodiscard]] const engine::Propagator& target() const noexcept { return *target_; }
   [[nodiscard]] int threads() const noexcept { return pool_.threads(); }
   /// Of the target and all companions.
   [[nodiscard]] std::size_t triangles() const noexcept { return triangles_; }
@@ -164,9 +166,9 @@ class Rig {
   hil::RollRule roll_;
   std::optional<engine::CameraAttitude> boresight_;
   hil::Jitter slow_vibration_;
-  engine::KeplerPropagator camera_;
-  engine::KeplerPropagator target_;
-  std::vector<std::unique_ptr<engine::Propagator>> companions_;
+  std::unique_ptr<const engine::Propagator> camera_;
+  std::unique_ptr<const engine::Propagator> target_;
+  std::vector<std::unique_ptr<const engine::Propagator>> companions_;
   hil::BelievedTarget believed_target_;
   engine::WorkerPool pool_;
   std::size_t triangles_ = 0;
@@ -177,6 +179,13 @@ class Rig {
 /// The camera that obeys, in a run that starts at `start`. The rig outlives it.
 [[nodiscard]] hil::ClosedLoopPointing make_pointing(const Scenario& scenario, const Rig& rig,
                                                     engine::SimTime start);
+
+/// Makes sure that all orbits have an answer when frames are taken by shutters that open in
+/// between, light's way and guidance that aims ahead included. Throws engine::ConfigError.
+void want_frames(Scenario& scenario, engine::SimTime first, engine::SimTime last);
+/// A body of the scenario as it moves, from the epoch to the last time that matters.
+[[nodiscard]] std::unique_ptr<const engine::Propagator> propagator_of(
+    const Scenario& scenario, const engine::OrbitSpec& orbit);
 
 [[nodiscard]] std::vector<engine::Pass> passes_of(const Scenario& scenario);
 /// The one that the scenario's run is about. Throws engine::ConfigError when there is no such.

@@ -154,6 +154,7 @@ int render_stages(const CommonOptions& options, const StagesOptions& stages) {
   scenario.stars.source = engine::StarSpec::Source::kNone;
   scenario.render.settled = true;
   scenario.run.pattern = true;  // the rig needs no generator of its own
+  want_frames(scenario, engine::sim_time(stages.time_s), engine::sim_time(stages.time_s));
   Rig rig(scenario, options.threads);
   Rig::Stages parts = rig.make_stages(scenario);
   engine::Optics still_optics(without_vibration(scenario.optics), faint_irradiance_w_m2(scenario),

@@ -39,6 +39,14 @@ struct StagesOptions {
 /// photon noise: a FITS of each, and one picture.
 int render_stages(const CommonOptions& options, const StagesOptions& stages);
 
+struct OrbitsOptions {
+  std::string reference;  ///< a table of places; empty: the models against each other
+  std::string out = "orbits";
+};
+/// Writes how far each model of motion is from a reference over the scenario's span, or from the
+/// model that the scenario chooses, and draws it. `out` is a folder.
+int compare_orbits(const CommonOptions& options, const OrbitsOptions& orbits);
+
 struct MtfOptions {
   double time_s = -1;  ///< shutter opens; below 0: at the chosen pass' closest
   std::string out = "mtf.csv";
