@@ -47,6 +47,16 @@ void bench_sun_track(benchmark::State& state) {
 }
 BENCHMARK(bench_sun_track);
 
+void bench_lit_fraction(benchmark::State& state) {
+  const auto model = static_cast<ShadowModel>(state.range(0));
+  const Position<J2000> sun{{kAstronomicalUnit_m, 0.0, 0.0}};
+  const Position<J2000> sunset{{-2350e3, state.range(1) == 0 ? 9e6 : kEarthRadius_m, 0.0}};
+  for (auto _ : state) benchmark::DoNotOptimize(lit_fraction(model, sunset, sun));
+}
+BENCHMARK(bench_lit_fraction)
+    ->ArgNames({"cylinder_cone_oblate", "in_penumbra"})
+    ->ArgsProduct({{0, 1, 2}, {0, 1}});
+
 /// A body whose place is asked for.
 class Counted final : public Propagator {
  public:

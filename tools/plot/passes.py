@@ -105,11 +105,18 @@ def draw_zoom(axes, windows, chosen, number):
     around = max(1.0, 0.6 * (end - start))
     draw_rows(axes, windows, rows_of(windows, False), max(span_begin, start - around),
               min(span_end, end + around), 1.0, closest)
+    marks = []
     for x, name in ((start, "AOS"), (closest, "TCA"), (end, "LOS")):
         axes.axvline(x - closest, color=SIZE, linewidth=0.8, linestyle=":")
+        if marks and x - marks[-1][0] < 0.1 * (end - start):
+            marks[-1][1] += ", " + name
+        else:
+            marks.append([x, name])
+    for x, name in marks:
         axes.text(x - closest, -0.55, name, ha="center", va="bottom", fontsize=8.5, color=GREY)
     axes.set_xlabel(f"seconds after {chosen['closest_utc'].replace('T', ' ')} UTC")
     cut = [chosen["start_limited_by"], chosen["end_limited_by"]]
+    cut = ["the search's end" if c == "span" else c for c in cut]
     axes.set_title(f"pass {number}: begins by {cut[0]}, ends by {cut[1]}", loc="left",
                    fontsize=10.5, pad=16)
 
@@ -119,7 +126,11 @@ def draw_curves(folder, passes, number):
     rows = read_table(folder / f"pass_{number}.csv")
     table = {n: np.array([float(r[n]) for r in rows]) for n in rows[0]}
     time = table["time_s"] - float(chosen["closest_s"])
-    curves = (("range_km", "range, km"), ("range_rate_km_s", "range rate, km/s"),
+    rate = "range rate, km/s"
+    if np.abs(table["range_rate_km_s"]).max() < 0.1:
+        table["range_rate_km_s"] *= 1e3
+        rate = "range rate, m/s"
+    curves = (("range_km", "range, km"), ("range_rate_km_s", rate),
               ("line_of_sight_rate_mrad_s", "line of sight\nturns, mrad/s"),
               ("phase_angle_deg", "phase angle, deg"))
     figure, panels = plt.subplots(len(curves), 1, figsize=(8, 8.4), sharex=True)
@@ -129,6 +140,7 @@ def draw_curves(folder, passes, number):
         axes.plot(time, table[name], color=X, linewidth=1.6)
         axes.set_ylabel(label)
         axes.margins(x=0)
+        axes.ticklabel_format(axis="y", useOffset=False)
         axes.set_ylim(axes.get_ylim())
         for where, colour in ((behind, Y), (dim, SIZE)):
             axes.fill_between(time, 0, 1, where=where, transform=axes.get_xaxis_transform(),
