@@ -5,6 +5,7 @@
 
 #include "engine/core/constants.h"
 #include "engine/orbit/kepler.h"
+#include "engine/orbit/sight_line.h"
 #include "engine/orbit/utc.h"
 
 namespace engine {
@@ -60,6 +61,12 @@ Eigen::Vector3d table1_sun_of_date_m(double t) noexcept {
 
 Position<J2000> sun_position(SunModel model, Epoch t) noexcept {
   return model == SunModel::kTable1 ? from_table1(t) : from_erfa(t);
+}
+
+Position<J2000> apparent_sun_position(SunModel model, Epoch t) noexcept {
+  const Position<J2000> sun = sun_position(model, t);
+  const double distance_m = sun.m.norm();
+  return {distance_m * aberrated(sun.m / distance_m, earth_velocity(t))};
 }
 
 Velocity<J2000> earth_velocity(Epoch t) noexcept {

@@ -24,6 +24,11 @@ struct SunSpec {
 /// The Sun from the Earth's centre, geometric, in J2000.
 [[nodiscard]] Position<J2000> sun_position(SunModel model, Epoch t) noexcept;
 
+/// The same as light from it comes to what moves with the Earth, turned by the Earth's velocity:
+/// up to 20.5". The Sun itself moves 13 m/s: light time adds 9e-3". Leaves out: a satellite's own
+/// velocity, 5" of the light that comes and of the light that goes.
+[[nodiscard]] Position<J2000> apparent_sun_position(SunModel model, Epoch t) noexcept;
+
 /// The Earth's centre about the solar system's barycentre, in J2000, by eraEpv00: within 5 mm/s.
 [[nodiscard]] Velocity<J2000> earth_velocity(Epoch t) noexcept;
 

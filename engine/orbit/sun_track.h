@@ -16,7 +16,9 @@ namespace engine {
 /// at the height of low orbits is 1 ns off by that. Thread: one. Loop-safe.
 class SunTrack {
  public:
-  explicit SunTrack(SunModel model) noexcept : model_(model) {}
+  explicit SunTrack(SunModel model) noexcept : model_(model) {
+    nodes_.fill(Eigen::Vector3d::Zero());
+  }
   [[nodiscard]] Position<J2000> at(Epoch t) noexcept;
 
  private:
@@ -27,7 +29,7 @@ class SunTrack {
 
   SunModel model_;
   std::int64_t step_ = std::numeric_limits<std::int64_t>::min();  ///< that the nodes are around
-  std::array<Eigen::Vector3d, kNodes> nodes_{};
+  std::array<Eigen::Vector3d, kNodes> nodes_;
 };
 
 }  // namespace engine

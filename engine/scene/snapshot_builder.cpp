@@ -160,7 +160,9 @@ Snapshot SnapshotBuilder::build(const Shot& shot) const noexcept {
   const SimTime middle = shot.shutter_open + shot.exposure / 2;
   const SightLine line =
       sight_line(camera_, target_, spec_.epoch + middle.time_since_epoch(), spec_.light_path);
-  const Position<J2000> sun = sun_position(spec_.sun.model, line.emitted);
+  const Position<J2000> sun = spec_.light_path == LightPath::kApparent
+                                  ? apparent_sun_position(spec_.sun.model, line.emitted)
+                                  : sun_position(spec_.sun.model, line.emitted);
   const BodyAxes axes = body_offset(spec_.target_offsets) * orbital_frame(line.target);
 
   Snapshot out;

@@ -53,6 +53,17 @@ TEST(Sun, ErfaIsWithinAnArcsecondAndOneInAHundredThousand) {
   }
 }
 
+TEST(Sun, ShinesFromWhereItIsSeenWithinAnArcsecond) {
+  const Csv reference("sun_reference.csv");
+  for (const Csv::Row& row : reference.rows()) {
+    const Epoch t = epoch_of(row);
+    const Eigen::Vector3d seen = vector(row, "app_x_GCRS", "app_y", "app_z");
+    EXPECT_LT(angle_between_rad(apparent_sun_position(SunModel::kErfa, t).m, seen), kArcsecond)
+        << row.text("epoch");
+    EXPECT_GT(angle_between_rad(sun_position(SunModel::kErfa, t).m, seen), 20.0 * kArcsecond);
+  }
+}
+
 TEST(Sun, UtcEpochsReachTheSameTerrestrialTime) {
   const Csv reference("sun_reference.csv");
   int compared = 0;
@@ -116,7 +127,7 @@ TEST(Sun, CorrectedTable1ReproducesTable6) {
 /// As an almanac has it: where an observer who moves with the Earth sees it, on the true equator
 /// and equinox of date.
 Eigen::Vector3d apparent_place(SunModel model, Epoch t) {
-  const Eigen::Vector3d seen = aberrated(sun_position(model, t).m.normalized(), earth_velocity(t));
+  const Eigen::Vector3d seen = apparent_sun_position(model, t).m.normalized();
   const TwoPartDate tt = terrestrial_time(t);
   double to_date[3][3];
   eraPnm06a(tt.day1, tt.day2, to_date);
