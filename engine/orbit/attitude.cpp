@@ -11,6 +11,13 @@ using Eigen::AngleAxisd;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
+/// The axis that lies furthest from a line.
+Vector3d apart_from(const Vector3d& unit) {
+  Eigen::Index smallest = 0;
+  unit.cwiseAbs().minCoeff(&smallest);
+  return Vector3d::Unit(smallest);
+}
+
 /// The paper's R_x, R_y, R_z turn the axes, so they are the transposes of the usual ones.
 Matrix3d axes_turned(double angle_rad, const Vector3d& axis) {
   return AngleAxisd(-angle_rad, axis).toRotationMatrix();
@@ -27,7 +34,12 @@ EulerOffsets read_offsets(const ConfigTable& table) {
 
 Rotation<OrbitalFrame, J2000> orbital_frame(const OrbitState& state) noexcept {
   const Vector3d nadir = -state.position.m.normalized();
-  const Vector3d normal = state.position.m.cross(state.velocity.m_s).normalized();
+  constexpr double kStraight = 1e-9;
+  const Vector3d spin = state.position.m.cross(state.velocity.m_s);
+  const bool straight =
+      !(spin.norm() > kStraight * state.position.m.norm() * state.velocity.m_s.norm());
+  const Vector3d normal =
+      straight ? apart_from(nadir).cross(nadir).normalized() : spin.normalized();
   Rotation<OrbitalFrame, J2000> frame;
   frame.matrix.row(0) = (-normal).cross(nadir);
   frame.matrix.row(1) = -normal;
@@ -49,10 +61,7 @@ CameraAttitude look_along(const Direction<J2000>& boresight,
   Vector3d y = axis.unit.cross(z);
   if (y.norm() <= kAxisLimit) {
     attitude.roll_is_fallback = true;
-    Vector3d other = Vector3d::Zero();
-    Eigen::Index smallest = 0;
-    z.cwiseAbs().minCoeff(&smallest);
-    other[smallest] = 1.0;
+    const Vector3d other = apart_from(z);
     y = other - other.dot(z) * z;
   }
   y.normalize();

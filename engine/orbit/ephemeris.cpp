@@ -116,30 +116,18 @@ void EphemerisPropagator::measure(const OemSegment& segment) {
 }
 
 OrbitState EphemerisPropagator::at(Epoch t) const noexcept {
-  const auto next =
-      std::upper_bound(segments_.begin(), segments_.end(), t,
-                       [](Epoch when, const OemSegment& s) { return when < s.usable.begin; });
-  const OemSegment& segment = next == segments_.begin() ? *next : *(next - 1);
-  t = std::clamp(t, segment.usable.begin, segment.usable.end);
-  const auto after = std::upper_bound(segment.times.begin(), segment.times.end(), t);
-  const auto row =
-      static_cast<std::size_t>(std::max<std::ptrdiff_t>(after - segment.times.begin(), 1) - 1);
+  const OemSegment& segment = segment_at(segments_, t);
+  t = std::clamp(t, segment.meta.usable.begin, segment.meta.usable.end);
+  const std::size_t row = row_before(segment.times, t);
   return interpolate(segment, window_about(segment, row, segment.window()), kNone, t);
 }
 
 EpochSpan EphemerisPropagator::span() const noexcept {
-  return {segments_.front().usable.begin, segments_.back().usable.end};
+  return {segments_.front().meta.usable.begin, segments_.back().meta.usable.end};
 }
 
 std::optional<EpochSpan> EphemerisPropagator::gap_in(const EpochSpan& wanted) const noexcept {
-  Epoch known = wanted.begin;  // until here there is something
-  for (const OemSegment& segment : segments_) {
-    if (segment.usable.begin > known)
-      return EpochSpan{known, std::min(segment.usable.begin, wanted.end)};
-    known = std::max(known, segment.usable.end);
-    if (known >= wanted.end) return std::nullopt;
-  }
-  return EpochSpan{known, wanted.end};
+  return engine::gap_in(segments_, wanted);
 }
 
 }  // namespace engine

@@ -1,14 +1,13 @@
 #include "engine/orbit/j2.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iterator>
 
 namespace engine {
 namespace {
 
-// The last terms of a step, as a share of the distance: under the rounding.
-constexpr double kLastTerm = 1e-17;
 constexpr Duration kShortestStep{1000};
 
 template <std::size_t Terms>
@@ -77,31 +76,24 @@ OrbitState J2Propagator::at(Epoch t) const noexcept {
 }
 
 OrbitState J2Propagator::Leg::at(Epoch t) const noexcept {
-  const double tau = seconds(t - origin) / length_s;
-  Eigen::Vector3d place = m[kOrder];
-  Eigen::Vector3d slope = Eigen::Vector3d::Zero();
-  for (std::size_t k = kOrder; k-- > 0;) {
-    slope = slope * tau + place;
-    place = place * tau + m[k];
-  }
-  return {{place}, {slope / length_s}};
+  const Terms::Motion motion = m.at(seconds(t - origin));
+  return {{motion.value}, {motion.rate}};
 }
 
-J2Propagator::Leg J2Propagator::expand(const OrbitState& state, Epoch t,
-                                       const OblateEarth& earth) noexcept {
-  using Terms = Series<kOrder + 1>;
+J2Propagator::Terms J2Propagator::expand(const OrbitState& state,
+                                         const OblateEarth& earth) noexcept {
   const double bulge = 1.5 * earth.j2 * earth.mu_m3_s2 * earth.radius_m * earth.radius_m;
-  Terms x{state.position.m.x(), state.velocity.m_s.x()};
-  Terms y{state.position.m.y(), state.velocity.m_s.y()};
-  Terms z{state.position.m.z(), state.velocity.m_s.z()};
-  Terms s;      // r^2
-  Terms z2;     // z^2
-  Terms cube;   // r^-3
-  Terms one;    // r^-2
-  Terms fifth;  // r^-5
-  Terms sine2;  // z^2 / r^2
-  Terms f;      // acceleration = -(x f, y f, z g)
-  Terms g;
+  Series<kOrder + 1> x{state.position.m.x(), state.velocity.m_s.x()};
+  Series<kOrder + 1> y{state.position.m.y(), state.velocity.m_s.y()};
+  Series<kOrder + 1> z{state.position.m.z(), state.velocity.m_s.z()};
+  Series<kOrder + 1> s;      // r^2
+  Series<kOrder + 1> z2;     // z^2
+  Series<kOrder + 1> cube;   // r^-3
+  Series<kOrder + 1> one;    // r^-2
+  Series<kOrder + 1> fifth;  // r^-5
+  Series<kOrder + 1> sine2;  // z^2 / r^2
+  Series<kOrder + 1> f;      // acceleration = -(x f, y f, z g)
+  Series<kOrder + 1> g;
   for (std::size_t k = 0; k + 2 <= kOrder; ++k) {
     z2[k] = square(z, k);
     s[k] = square(x, k) + square(y, k) + z2[k];
@@ -116,10 +108,9 @@ J2Propagator::Leg J2Propagator::expand(const OrbitState& state, Epoch t,
     y[k + 2] = -product(y, f, k) / twice;
     z[k + 2] = -product(z, g, k) / twice;
   }
-  Leg leg;
-  leg.origin = t;
-  for (std::size_t k = 0; k <= kOrder; ++k) leg.m[k] = {x[k], y[k], z[k]};
-  return leg;
+  std::array<Eigen::Vector3d, kOrder + 1> terms;
+  for (std::size_t k = 0; k <= kOrder; ++k) terms[k] = {x[k], y[k], z[k]};
+  return Terms(terms);
 }
 
 std::vector<J2Propagator::Leg> J2Propagator::integrate(OrbitState state, Epoch t, Epoch end,
@@ -127,22 +118,10 @@ std::vector<J2Propagator::Leg> J2Propagator::integrate(OrbitState state, Epoch t
   const int way = end < t ? -1 : 1;
   std::vector<Leg> legs;
   do {
-    Leg leg = expand(state, t, earth);
-    // As far as the last two terms are nothing.
-    double reach_s = HUGE_VAL;
-    for (const std::size_t k : {kOrder - 1, kOrder})
-      reach_s = std::min(reach_s, std::pow(kLastTerm * leg.m[0].norm() / leg.m[k].norm(),
-                                           1.0 / static_cast<double>(k)));
-    const double left_s = std::abs(seconds(end - t));
-    const bool last = reach_s >= left_s;
-    const Duration whole = last ? (end - t) * way : from_seconds(reach_s);
+    const Leg leg{t, expand(state, earth)};
+    const bool last = leg.m.reach_s() >= std::abs(seconds(end - t));
+    const Duration whole = last ? (end - t) * way : from_seconds(leg.m.reach_s());
     const Duration step = way * std::max(kShortestStep, whole);
-    leg.length_s = std::abs(seconds(step));
-    double scale = 1.0;
-    for (Eigen::Vector3d& term : leg.m) {
-      term *= scale;
-      scale *= leg.length_s;
-    }
     // Often enough that no perigee between is faster by more than the margin.
     constexpr int kLooks = 4;
     for (int i = 0; i <= kLooks; ++i)

@@ -1,10 +1,10 @@
 #pragma once
 
-#include <array>
 #include <vector>
 
 #include "engine/core/constants.h"
 #include "engine/orbit/propagator.h"
+#include "engine/orbit/taylor_leg.h"
 
 namespace engine {
 
@@ -45,17 +45,14 @@ class J2Propagator final : public Propagator {
  private:
   static constexpr std::size_t kOrder = 24;
 
-  /// A step: the place as a polynomial of the time since `origin` over `length_s`.
+  using Terms = TaylorLeg<3, kOrder>;
   struct Leg {
     Epoch origin;
-    double length_s = 0;
-    std::array<Eigen::Vector3d, kOrder + 1> m;
+    Terms m;
 
     [[nodiscard]] OrbitState at(Epoch t) const noexcept;
   };
-  /// The series of a state, not yet as long as it will be.
-  [[nodiscard]] static Leg expand(const OrbitState& state, Epoch t,
-                                  const OblateEarth& earth) noexcept;
+  [[nodiscard]] static Terms expand(const OrbitState& state, const OblateEarth& earth) noexcept;
   /// Legs from a state until `end`, in the order of their making. Either way in time.
   [[nodiscard]] std::vector<Leg> integrate(OrbitState state, Epoch t, Epoch end,
                                            const OblateEarth& earth);

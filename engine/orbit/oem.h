@@ -1,10 +1,8 @@
 #pragma once
 
-#include <string>
 #include <vector>
 
-#include "engine/orbit/kvn.h"
-#include "engine/orbit/propagator.h"
+#include "engine/orbit/file_segments.h"
 
 namespace engine {
 
@@ -16,8 +14,7 @@ enum class Interpolation : std::uint8_t {
 
 /// What stands between two META_START: rows of one body, to be interpolated among themselves only.
 struct OemSegment {
-  std::string where;  ///< "file:line" of its META_START
-  EpochSpan usable;
+  SegmentMeta meta;
   Interpolation interpolation = Interpolation::kHermite;
   int degree = 7;  ///< of the polynomials
   std::vector<Epoch> times;

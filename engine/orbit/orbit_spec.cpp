@@ -47,13 +47,7 @@ void need_span(const OrbitSpec& spec, const EpochSpan& wanted) {
     throw ConfigError(spec.where + " \"j2\" is integrated for 1100 days at most, asked for until " +
                       utc_text(wanted.end) + " UTC");
   if (spec.model != OrbitModel::kEphemeris) return;
-  const auto gap = spec.ephemeris->gap_in(wanted);
-  if (!gap) return;
-  const EpochSpan has = spec.ephemeris->span();
-  throw ConfigError(spec.where + " must have the body from " + utc_text(wanted.begin) + " to " +
-                    utc_text(wanted.end) + " UTC, has nothing from " + utc_text(gap->begin) +
-                    " to " + utc_text(gap->end) + "; it may be used from " + utc_text(has.begin) +
-                    " to " + utc_text(has.end));
+  if (const auto gap = spec.ephemeris->gap_in(wanted)) fail_for_gap(spec.where, wanted, *gap);
 }
 
 std::unique_ptr<const Propagator> make_propagator(const OrbitSpec& spec, Epoch epoch,

@@ -19,7 +19,7 @@ CompanionSpec read_companion(const ConfigReader& config, const std::string& name
   spec.name = name;
   spec.mesh = table.text_or("mesh", spec.mesh);
   spec.mesh_where = table.where("mesh");
-  spec.attitude = read_offsets(table);
+  spec.attitude = read_attitude(table);
   const bool held = table.has("radial_m") || table.has("along_m") || table.has("cross_m");
   if (table.has("orbit")) {
     if (held) table.fail("orbit", "and radial_m, along_m, cross_m exclude each other");

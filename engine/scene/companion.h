@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "engine/core/config_reader.h"
-#include "engine/orbit/attitude.h"
+#include "engine/orbit/body_attitude.h"
 #include "engine/orbit/held_offset.h"
 #include "engine/orbit/orbit_spec.h"
 #include "engine/scene/snapshot.h"
@@ -19,7 +19,7 @@ struct CompanionSpec {
   std::string mesh_where;          ///< the place in the scenario that names it
   std::optional<OrbitSpec> orbit;  ///< none: it is held beside the target
   OrbitalOffset offset;            ///< where it has no orbit of its own
-  EulerOffsets attitude;           ///< from its own orbital frame, or the target's where it is held
+  AttitudeSpec attitude;           ///< from its own orbital frame, or the target's where it is held
 };
 /// Reads companions.<name> for each name below `companions`, kMostCompanions at most.
 [[nodiscard]] std::vector<CompanionSpec> read_companions(const ConfigReader& config);
@@ -28,10 +28,10 @@ struct CompanionSpec {
 struct Companion {
   const Propagator& place;
   const Propagator& upright;  ///< whose orbital frame its attitude is counted from
-  EulerOffsets attitude;
+  BodyAttitude attitude;
 
   [[nodiscard]] Rotation<BodyFrame, J2000> axes(Epoch t) const noexcept {
-    return body_offset(attitude) * orbital_frame(upright.at(t));
+    return attitude.axes(t, upright.at(t));
   }
 };
 

@@ -163,7 +163,7 @@ Snapshot SnapshotBuilder::build(const Shot& shot) const noexcept {
   const Position<J2000> sun = spec_.light_path == LightPath::kApparent
                                   ? apparent_sun_position(spec_.sun.model, line.emitted)
                                   : sun_position(spec_.sun.model, line.emitted);
-  const BodyAxes axes = body_offset(spec_.target_offsets) * orbital_frame(line.target);
+  const BodyAxes axes = attitude_.axes(line.emitted, line.target);
 
   Snapshot out;
   out.sequence = shot.sequence;

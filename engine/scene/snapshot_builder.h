@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "engine/core/contract.h"
-#include "engine/orbit/attitude.h"
+#include "engine/orbit/body_attitude.h"
 #include "engine/orbit/propagator.h"
 #include "engine/orbit/shadow.h"
 #include "engine/orbit/sight_line.h"
@@ -24,7 +24,7 @@ struct SceneSpec {
   ShadowModel shadow = ShadowModel::kOblateCone;  ///< the Earth's, on all bodies
   EarthSpec earth;
   EarthshineSensor earthshine_sensor;  ///< for EarthshineModel::kAuto
-  EulerOffsets target_offsets;
+  AttitudeSpec target_attitude;
   double sky_w_m2_sr = 0;  ///< zodiacal light and what else is even over the field
   CameraGeometry camera;
 };
@@ -40,7 +40,11 @@ class SnapshotBuilder {
   /// Pre: at most kMostCompanions.
   SnapshotBuilder(const SceneSpec& spec, const Propagator& camera, const Propagator& target,
                   std::vector<Companion> companions = {})
-      : spec_(spec), camera_(camera), target_(target), companions_(std::move(companions)) {
+      : spec_(spec),
+        camera_(camera),
+        target_(target),
+        companions_(std::move(companions)),
+        attitude_(spec.target_attitude, spec.epoch) {
     ENSURE(companions_.size() <= kMostCompanions);
   }
 
@@ -73,6 +77,7 @@ class SnapshotBuilder {
   const Propagator& camera_;
   const Propagator& target_;
   std::vector<Companion> companions_;
+  BodyAttitude attitude_;  ///< of the target
 };
 
 }  // namespace engine

@@ -1,10 +1,12 @@
 // What `starloop orbits` writes, and what the other subcommands say of the models of motion.
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <map>
 #include <sstream>
 #include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 #include <starloop_test_paths.h>
@@ -19,10 +21,10 @@ using program::starloop;
 
 const std::string kFlyby = STARLOOP_SOURCE_DIR "/config/flyby.toml";
 
-/// The largest error of each "body,model" until a time.
-std::map<std::string, double> worst_until(const fs::path& csv, double last_s) {
+/// Of each "body,model" the errors until a time, in the table's order.
+std::map<std::string, std::vector<double>> errors_until(const fs::path& csv, double last_s) {
   std::istringstream lines(program::content_of(csv));
-  std::map<std::string, double> worst;
+  std::map<std::string, std::vector<double>> errors;
   std::string line;
   std::getline(lines, line);
   EXPECT_EQ(line, "body,model,t_s,error_m");
@@ -30,10 +32,14 @@ std::map<std::string, double> worst_until(const fs::path& csv, double last_s) {
     const std::size_t second = line.find(',', line.find(',') + 1);
     std::size_t used = 0;
     const double t_s = std::stod(line.substr(second + 1), &used);
-    double& most = worst[line.substr(0, second)];
-    if (t_s <= last_s) most = std::max(most, std::stod(line.substr(second + used + 2)));
+    std::vector<double>& all = errors[line.substr(0, second)];
+    if (t_s <= last_s) all.push_back(std::stod(line.substr(second + used + 2)));
   }
-  return worst;
+  return errors;
+}
+
+double worst(const std::vector<double>& errors) {
+  return *std::max_element(errors.begin(), errors.end());
 }
 
 TEST(Orbits, TwoBodyMotionIsTheReferencesWithinTheModelsRequirement) {
@@ -43,12 +49,12 @@ TEST(Orbits, TwoBodyMotionIsTheReferencesWithinTheModelsRequirement) {
                                 (folder.path() / "o").string()});
   ASSERT_EQ(run.exit_code, 0) << run.err;
   const fs::path csv = folder.path() / "o" / "orbits.csv";
-  const auto day = worst_until(csv, 86400.0);
-  const auto all = worst_until(csv, 1e9);
+  const auto day = errors_until(csv, 86400.0);
+  const auto all = errors_until(csv, 1e9);
   for (const std::string body : {"camera", "target"}) {
-    EXPECT_LT(day.at(body + ",two-body"), 1e-5);
-    EXPECT_LT(all.at(body + ",two-body"), 1e-4);
-    EXPECT_GT(all.at(body + ",j2"), 1e6);
+    EXPECT_LT(worst(day.at(body + ",two-body")), 1e-5);
+    EXPECT_LT(worst(all.at(body + ",two-body")), 1e-4);
+    EXPECT_GT(worst(all.at(body + ",j2")), 1e6);
   }
   EXPECT_TRUE(fs::exists(folder.path() / "o" / "orbits.png") ||
               run.out.find("no picture") != std::string::npos);
@@ -59,12 +65,11 @@ TEST(Orbits, WithoutAReferenceTheModelsAreComparedWithTheScenarios) {
   const Outcome run = starloop({"orbits", kFlyby, "--set", "orbit.camera.propagator=j2", "--set",
                                 "visibility.span_days=3", "-o", folder.path().string()});
   ASSERT_EQ(run.exit_code, 0) << run.err;
-  const auto worst = worst_until(folder.path() / "orbits.csv", 1e9);
-  ASSERT_EQ(worst.size(), 2U);
-  // The distances after three days are 1497 and 837 km; on the way there they are no larger by
-  // much.
-  EXPECT_NEAR(worst.at("camera,two-body"), 1497e3, 30e3);
-  EXPECT_NEAR(worst.at("target,j2"), 837e3, 30e3);
+  const auto errors = errors_until(folder.path() / "orbits.csv", 1e9);
+  ASSERT_EQ(errors.size(), 2U);
+  // Computed independently for this project, after three days.
+  EXPECT_NEAR(errors.at("camera,two-body").back(), 1497e3, 500.0);
+  EXPECT_NEAR(errors.at("target,j2").back(), 837e3, 500.0);
 }
 
 TEST(Orbits, ABadReferenceIsRefusedWithItsLine) {

@@ -258,7 +258,7 @@ Scenario read_scenario(const ConfigReader& config) {
   s.scene.camera = engine::read_camera_geometry(config.table("camera"));
   s.scene.sun = engine::read_sun(config.table("sun"));
   s.scene.earth = engine::read_earth(config.table("earth"));
-  s.scene.target_offsets = engine::read_offsets(config.table("target"));
+  s.scene.target_attitude = engine::read_attitude(config.table("target"));
   s.scene.sky_w_m2_sr =
       config.table("sky").number_or("radiance_w_m2_sr", 0.0, engine::at_least(0.0));
   s.stars = engine::read_stars(config.table("stars"));
@@ -410,7 +410,7 @@ std::vector<engine::Companion> Rig::move_companions(const Scenario& scenario) {
     }
     const engine::Propagator& place = *companions_.back();
     const engine::Propagator& upright = spec.orbit ? place : *target_;
-    moving.push_back({place, upright, spec.attitude});
+    moving.push_back({place, upright, engine::BodyAttitude(spec.attitude, epoch_)});
   }
   return moving;
 }
@@ -471,6 +471,9 @@ void need_orbits(const Scenario& scenario, engine::SimTime first, engine::SimTim
                                             end + std::max(ahead, Duration{})});
   for (const engine::CompanionSpec& companion : scenario.companions)
     if (companion.orbit) engine::need_span(*companion.orbit, {begin - apparent, end});
+  engine::need_span(scenario.scene.target_attitude, {begin - apparent, end});
+  for (const engine::CompanionSpec& companion : scenario.companions)
+    engine::need_span(companion.attitude, {begin - apparent, end});
 }
 
 }  // namespace

@@ -43,6 +43,22 @@ TEST(OrbitalFrame, OfAnEquatorialOrbitIsKnownByHand) {
   EXPECT_EQ(orbital_frame(s).matrix, want);
 }
 
+TEST(OrbitalFrame, OfMotionStraightUpOrDownIsARotationThatStays) {
+  for (const Vector3d& up : {Vector3d(1, 0, 0), Vector3d(0, 0, -1), Vector3d(0.3, -0.5, 0.8)}) {
+    Matrix3d before = Matrix3d::Zero();
+    for (const double speed_m_s : {5e3, 1.0, 0.0, -1.0, -5e3}) {
+      const OrbitState s{{8e6 * up.normalized()}, {speed_m_s * up.normalized()}};
+      const Matrix3d axes = orbital_frame(s).matrix;
+      expect_rotation(axes);
+      EXPECT_LT((axes.row(2).transpose() + up.normalized()).norm(), 1e-15);
+      if (speed_m_s < 5e3) {
+        EXPECT_EQ(axes, before);
+      }
+      before = axes;
+    }
+  }
+}
+
 Matrix3d r_x(double a) {
   Matrix3d m;
   m << 1, 0, 0, 0, std::cos(a), std::sin(a), 0, -std::sin(a), std::cos(a);

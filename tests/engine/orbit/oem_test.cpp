@@ -57,13 +57,13 @@ TEST(Oem, ReadsWhatOtherToolsWrite) {
   const std::vector<OemSegment> segments = parse(kGood);
   ASSERT_EQ(segments.size(), 1U);
   const OemSegment& s = segments[0];
-  EXPECT_EQ(s.where, "x.oem:6");
+  EXPECT_EQ(s.meta.where, "x.oem:6");
   EXPECT_EQ(s.interpolation, Interpolation::kLagrange);
   EXPECT_EQ(s.degree, 2);
   ASSERT_EQ(s.times.size(), 4U);
   EXPECT_EQ(s.times[2], epoch_from_utc("2022-01-01T00:02:00").value());
-  EXPECT_EQ(s.usable.begin, epoch_from_utc("2022-01-01T00:00:10").value());
-  EXPECT_EQ(s.usable.end, epoch_from_utc("2022-01-01T00:02:50").value());
+  EXPECT_EQ(s.meta.usable.begin, epoch_from_utc("2022-01-01T00:00:10").value());
+  EXPECT_EQ(s.meta.usable.end, epoch_from_utc("2022-01-01T00:02:50").value());
   EXPECT_DOUBLE_EQ(s.states[0].position.m.y(), 1000.0);
   EXPECT_DOUBLE_EQ(s.states[0].velocity.m_s.x(), -1.0);
   EXPECT_DOUBLE_EQ(s.states[1].position.m.y(), 450e3);
@@ -96,7 +96,8 @@ TEST(Oem, PointsAtTheLineOfEachDefect) {
     const char* complaint;
   };
   const Defect kDefects[] = {
-      {"CCSDS_OEM_VERS = 2.0", "CCSDS_OEM_VERS = 4.0", "x.oem:1: expected version 1.0, 2.0 or 3.0"},
+      {"CCSDS_OEM_VERS = 2.0", "CCSDS_OEM_VERS = 4.0",
+       "x.oem:1: expected one of the versions 1.0, 2.0, 3.0"},
       {"CCSDS_OEM_VERS", "CCSDS_OPM_VERS", "x.oem:1: expected CCSDS_OEM_VERS"},
       {"ORIGINATOR", "ORIGIN", "x.oem:4: expected META_START"},
       {"META_START", "META_BEGIN", "x.oem:6: expected META_START"},

@@ -45,7 +45,7 @@ TEST(Companion, IsReadWithAnOrbitOrAnOffset) {
   EXPECT_FALSE(companions[0].orbit.has_value());
   EXPECT_EQ(companions[0].offset.along_m, -20.5);
   EXPECT_EQ(companions[0].offset.radial_m, 0.0);
-  EXPECT_DOUBLE_EQ(companions[0].attitude.yaw_rad, 0.5 * kPi);
+  EXPECT_DOUBLE_EQ(companions[0].attitude.offsets.yaw_rad, 0.5 * kPi);
   EXPECT_EQ(companions[1].mesh, "telescope");
   ASSERT_TRUE(companions[1].orbit.has_value());
   EXPECT_EQ(companions[1].orbit->elements.semi_major_axis_m, 7e6);
@@ -94,16 +94,17 @@ TEST(Companion, IsSeenFromWhereItsCentreSaysItIs) {
   // Without light time there is one instant for all: each body's view follows from the target's.
   const Flyby flyby;
   const HeldOffset place(flyby.target, {40.0, -300.0, 25.0});
-  const EulerOffsets attitude{0.3, -0.4, 1.1};
+  AttitudeSpec attitude;
+  attitude.offsets = {0.3, -0.4, 1.1};
   const SnapshotBuilder builder(spec_of(flyby, LightPath::kGeometric), flyby.camera, flyby.target,
-                                {{place, flyby.target, attitude}});
+                                {{place, flyby.target, {attitude, flyby.epoch}}});
   const Snapshot s = builder.build(shot_at(flyby, kClosestOfPass3_s));
   ASSERT_EQ(s.companions, 1U);
   const CompanionView& view = s.companion[0];
   // In the orbital frame: x ahead, y against the normal, z down.
   EXPECT_LT((view.centre.m - Vector3d(-300.0, -25.0, -40.0)).norm(), 1e-8);
   const Eigen::Matrix3d& turn = view.from_target.matrix;
-  EXPECT_LT((turn - body_offset(attitude).matrix).norm(), 1e-12);
+  EXPECT_LT((turn - body_offset(attitude.offsets).matrix).norm(), 1e-12);
   EXPECT_LT((view.camera.m - turn * (s.camera.m - view.centre.m)).norm(), 1e-7);
   EXPECT_LT((view.body_from_camera.matrix - turn * s.body_from_camera.matrix).norm(), 1e-12);
   // The Sun is as far as it is: 300 m turn it by 2e-9 rad.

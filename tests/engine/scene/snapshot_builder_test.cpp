@@ -114,9 +114,9 @@ TEST(SnapshotBuilder, TurnsTheBodyByItsOffsets) {
   SceneSpec spec = spec_of(flyby);
   const Shot shot = tracked_shot(flyby, kClosestOfPass3_s);
   const Snapshot plain = SnapshotBuilder(spec, flyby.camera, flyby.target).build(shot);
-  spec.target_offsets = {0.1, -0.2, 0.3};
+  spec.target_attitude.offsets = {0.1, -0.2, 0.3};
   const Snapshot turned = SnapshotBuilder(spec, flyby.camera, flyby.target).build(shot);
-  const Eigen::Matrix3d offset = body_offset(spec.target_offsets).matrix;
+  const Eigen::Matrix3d offset = body_offset(spec.target_attitude.offsets).matrix;
   EXPECT_LT((turned.camera.m - offset * plain.camera.m).norm(), 1e-9);
   EXPECT_LT((turned.sun.toward.unit - offset * plain.sun.toward.unit).norm(), 1e-14);
   EXPECT_EQ(turned.target_px.u, plain.target_px.u);
@@ -288,7 +288,7 @@ TEST(SnapshotBuilder, TheEarthInTheFrameMayBeLeftOut) {
 TEST(SnapshotBuilder, TheEarthLightIsThatOfTheLampInBodyAxes) {
   const Flyby flyby;
   SceneSpec spec = spec_of(flyby);
-  spec.target_offsets = {0.1, -0.2, 0.3};
+  spec.target_attitude.offsets = {0.1, -0.2, 0.3};
   for (const double t_s : {0.0, 1200.0, 309781.0}) {
     const Shot shot = tracked_shot(flyby, t_s);
     spec.earth.earthshine = EarthshineModel::kVector;
@@ -302,7 +302,7 @@ TEST(SnapshotBuilder, TheEarthLightIsThatOfTheLampInBodyAxes) {
       const Vector3d light = s.earthshine.toward.unit * s.earthshine.irradiance_w_m2;
       EXPECT_LE((s.earth.vector_irradiance_w_m2() - light).norm(), 1e-12 * light.norm());
       // Below the target is where the body's z points, turned by its offsets.
-      const Vector3d nadir = body_offset(spec.target_offsets).matrix * Vector3d::UnitZ();
+      const Vector3d nadir = body_offset(spec.target_attitude.offsets).matrix * Vector3d::UnitZ();
       EXPECT_LT((s.earth.disc().to_centre.unit - nadir).norm(), 1e-12);
       EXPECT_LT((s.earth.disc().to_sun.unit - s.sun.toward.unit).norm(), 1e-4);
     }
