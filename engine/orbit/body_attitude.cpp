@@ -54,10 +54,10 @@ void read_tumbling(const ConfigTable& table, AttitudeSpec& spec) {
 
 void read_file(const ConfigTable& table, AttitudeSpec& spec) {
   spec.where = table.where("attitude_file");
+  const std::string path = table.text("attitude_file");
   try {
-    spec.segments = read_aem(KvnLines::from_file(table.text("attitude_file")));
+    spec.segments = read_aem(KvnLines::from_file(path));
   } catch (const ConfigError& e) {
-    if (!table.has("attitude_file")) throw;
     table.fail("attitude_file", std::string("is no attitude: ") + e.what());
   }
 }

@@ -239,7 +239,10 @@ TEST(ReadAttitude, TakesDegrees) {
 TEST(ReadAttitude, RefusesWithTheKey) {
   const std::string spin = "attitude = \"spin\"\nspin_axis = [0, 0, 1]\n";
   const std::string tumbling = "attitude = \"tumbling\"\nrate_deg_s = [0, 1, 1]\n";
-  const std::array<std::array<std::string, 2>, 12> kBad{{
+  const std::array<std::array<std::string, 2>, 14> kBad{{
+      {"attitude = \"aem\"\n", "target.attitude_file is missing"},
+      {"attitude = \"aem\"\nattitude_file = \"/nowhere.aem\"\n",
+       "x.toml:3: target.attitude_file is no attitude: /nowhere.aem: expected"},
       {"attitude = \"up\"\n", "target.attitude must be one of"},
       {"attitude = \"spin\"\n", "target.spin_axis is missing"},
       {spin, "target.spin_rate_deg_s is missing"},
