@@ -16,7 +16,7 @@ from pointing_error import STYLE
 
 COLOURS = {"two-body": "#0072B2", "j2": "#D55E00", "ephemeris": "#00795A"}
 DAY_S = 86400.0
-LEAST_M = 1e-7  # what is less than this is drawn there
+LEAST_M = 1e-9  # what is less than this is drawn there
 
 
 def draw(axes, table, unit_s, last_s):
