@@ -33,7 +33,8 @@ bool is_of_a_body(std::string_view frame) {
 }
 
 void take(const KvnLines& lines, const KvnLines::Entry& entry, Order& order) {
-  const auto& [key, value] = entry;
+  const std::string_view key = entry.key;
+  const std::string_view value = entry.value;
   const auto fail = [&](const std::string& expected) {
     lines.fail("expected " + expected + ", found \"" + std::string(value.substr(0, 60)) + "\"");
   };
