@@ -52,6 +52,10 @@ std::vector<Body> bodies_of(const Scenario& scenario) {
   return bodies;
 }
 
+[[noreturn]] void fail_at(const std::string& path, int line, const std::string& complaint) {
+  throw engine::ConfigError(path + ":" + std::to_string(line) + ": " + complaint);
+}
+
 /// A comma-separated table with columns body ("camera" or "target"), t_s, x_km, y_km, z_km, and
 /// whatever else.
 std::vector<ReferenceRow> read_reference(const std::string& path, double last_s) {
@@ -73,13 +77,11 @@ std::vector<ReferenceRow> read_reference(const std::string& path, double last_s)
     column[i] = static_cast<std::size_t>(std::find(names.begin(), names.end(), kColumns[i]) -
                                          names.begin());
     if (column[i] == names.size())
-      throw engine::ConfigError(path + ":1: expected a column " + kColumns[i] + ", found none");
+      fail_at(path, 1, std::string("expected a column ") + kColumns[i] + ", found none");
   }
   std::vector<ReferenceRow> rows;
   for (int number = 2; std::getline(file, line); ++number) {
-    const auto fail = [&](const std::string& complaint) {
-      throw engine::ConfigError(path + ":" + std::to_string(number) + ": " + complaint);
-    };
+    const auto fail = [&](const std::string& complaint) { fail_at(path, number, complaint); };
     const std::vector<std::string> cells = cells_of(line);
     if (cells.empty()) continue;
     if (cells.size() != names.size())
