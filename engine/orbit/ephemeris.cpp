@@ -20,6 +20,11 @@ struct Interpolated {
 /// Newton's polynomial through what is added to it.
 class NewtonPolynomial {
  public:
+  NewtonPolynomial() noexcept {
+    times_.fill(0.0);
+    differences_.fill(Vector3d::Zero());
+    rates_.fill(Vector3d::Zero());
+  }
   /// A node at a time, in seconds.
   void add(double t_s, const Vector3d& value) noexcept {
     times_[count_] = t_s;

@@ -20,7 +20,9 @@ std::string_view trimmed(std::string_view text) {
 }
 
 std::string quoted(std::string_view text) {
-  return "\"" + std::string(text.substr(0, kLongestQuote)) + "\"";
+  std::string quote = "\"";
+  quote += text.substr(0, kLongestQuote);
+  return quote += '"';
 }
 
 }  // namespace
