@@ -168,6 +168,7 @@ FrameReport ImagingChain::expose(const Shot& shot, Budget budget, DnImage& out,
   truth.earthshine_w_m2 = snapshot.earthshine.irradiance_w_m2;
   truth.earth_behind = snapshot.earth_behind;
   truth.roll_is_fallback = snapshot.roll_is_fallback;
+  truth.attitude_is_fallback = snapshot.attitude_is_fallback;
   tell_companions(snapshot, report.render, truth);
   const auto pixels = out.pixels();
   report.peak_dn = *std::max_element(pixels.begin(), pixels.end());

@@ -50,6 +50,7 @@ struct FrameTruth {
   double earthshine_w_m2 = 0;
   bool earth_behind = false;
   bool roll_is_fallback = false;
+  bool attitude_is_fallback = false;
   std::array<CompanionTruth, kMostCompanions> companion{};  ///< the first `companions` of them
   std::size_t companions = 0;
 };

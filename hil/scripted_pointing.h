@@ -34,7 +34,8 @@ class ScriptedPointing final : public PointingSource {
   }
   /// Nadir: boresight to the Earth's centre, by geometry; x along the track.
   [[nodiscard]] engine::CameraAttitude nadir(engine::SimTime t) const noexcept {
-    return {{engine::orbital_frame(camera_.at(epoch_ + t.time_since_epoch())).matrix}, false};
+    const engine::OrbitState state = camera_.at(epoch_ + t.time_since_epoch());
+    return {{engine::orbital_frame(state).matrix}, engine::moves_straight(state)};
   }
   void apply(const Command& /*command*/) noexcept override {}
   [[nodiscard]] TrimAngles trim_rad() const noexcept override { return {}; }

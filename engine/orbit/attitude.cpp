@@ -32,14 +32,18 @@ EulerOffsets read_offsets(const ConfigTable& table) {
           table.number_or("yaw_deg", 0.0, turn) * kDegree};
 }
 
+bool moves_straight(const OrbitState& state) noexcept {
+  constexpr double kStraight = 1e-9;
+  const Vector3d& r = state.position.m;
+  const Vector3d& v = state.velocity.m_s;
+  return !(r.cross(v).norm() > kStraight * r.norm() * v.norm());
+}
+
 Rotation<OrbitalFrame, J2000> orbital_frame(const OrbitState& state) noexcept {
   const Vector3d nadir = -state.position.m.normalized();
-  constexpr double kStraight = 1e-9;
-  const Vector3d spin = state.position.m.cross(state.velocity.m_s);
-  const bool straight =
-      !(spin.norm() > kStraight * state.position.m.norm() * state.velocity.m_s.norm());
-  const Vector3d normal =
-      straight ? apart_from(nadir).cross(nadir).normalized() : spin.normalized();
+  const Vector3d normal = moves_straight(state)
+                              ? apart_from(nadir).cross(nadir).normalized()
+                              : state.position.m.cross(state.velocity.m_s).normalized();
   Rotation<OrbitalFrame, J2000> frame;
   frame.matrix.row(0) = (-normal).cross(nadir);
   frame.matrix.row(1) = -normal;

@@ -15,10 +15,11 @@ struct EulerOffsets {
 [[nodiscard]] EulerOffsets read_offsets(const ConfigTable& table);
 
 /// x along track, y minus the orbit normal, z nadir. Eq 2 of Li et al. 2023, from position and
-/// velocity. x is along track as a perpendicular to nadir, not along the velocity; of motion
-/// straight up or down, to 1e-9 rad, at the J2000 axis furthest from nadir. Pre: not at the Earth's
-/// centre.
+/// velocity. x is along track as a perpendicular to nadir, not along the velocity; where
+/// moves_straight(), at the J2000 axis furthest from nadir. Pre: not at the Earth's centre.
 [[nodiscard]] Rotation<OrbitalFrame, J2000> orbital_frame(const OrbitState& state) noexcept;
+/// Motion straight up or down, to 1e-9 rad: an orbital frame has no answer of its own for it.
+[[nodiscard]] bool moves_straight(const OrbitState& state) noexcept;
 
 [[nodiscard]] Rotation<BodyFrame, OrbitalFrame> body_offset(const EulerOffsets& offsets) noexcept;
 

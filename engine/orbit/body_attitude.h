@@ -47,6 +47,10 @@ class BodyAttitude {
   BodyAttitude(const AttitudeSpec& spec = {}, Epoch epoch = {});
 
   [[nodiscard]] Rotation<BodyFrame, J2000> axes(Epoch t, const OrbitState& upright) const noexcept;
+  /// The rule had no answer of its own: moves_straight().
+  [[nodiscard]] bool is_fallback(const OrbitState& upright) const noexcept {
+    return spec_.kind == AttitudeKind::kNadir && moves_straight(upright);
+  }
 
  private:
   AttitudeSpec spec_;

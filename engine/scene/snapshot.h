@@ -106,6 +106,7 @@ struct Snapshot : BodyView {
   EarthInFrame earth_in_frame;    ///< seen from the camera; not drawn: not seen
   bool earth_behind = false;      ///< the line of sight meets the Earth beyond the target
   bool roll_is_fallback = false;
+  bool attitude_is_fallback = false;  ///< the target's
 
   std::array<CompanionView, kMostCompanions> companion{};  ///< the first `companions` of them
   std::size_t companions = 0;

@@ -188,6 +188,7 @@ Snapshot SnapshotBuilder::build(const Shot& shot) const noexcept {
     out.earth_in_frame.air = spec_.earth.air;
   }
   out.roll_is_fallback = shot.attitude.middle.roll_is_fallback;
+  out.attitude_is_fallback = attitude_.is_fallback(line.target);
   out.earthshine_rung = light_up(line, axes, sun, out);
   add_companions(line, axes, sun, shot, out);
   return out;

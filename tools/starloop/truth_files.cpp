@@ -87,6 +87,7 @@ Json truth_of(const hil::FrameRecord& record) {
       {"earthshine_w_m2", t.earthshine_w_m2},
       {"earth_behind", t.earth_behind},
       {"roll_is_fallback", t.roll_is_fallback},
+      {"attitude_is_fallback", t.attitude_is_fallback},
       {"stars", stars_of(record.report.stars)},
       {"trim_rad", record.trim_rad},
       {"measured_j2000_to_camera_wxyz", m.j2000_to_camera},

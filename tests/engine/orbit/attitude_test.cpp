@@ -50,6 +50,7 @@ TEST(OrbitalFrame, OfMotionStraightUpOrDownIsARotationThatStays) {
       const OrbitState s{{8e6 * up.normalized()}, {speed_m_s * up.normalized()}};
       const Matrix3d axes = orbital_frame(s).matrix;
       expect_rotation(axes);
+      EXPECT_TRUE(moves_straight(s));
       EXPECT_LT((axes.row(2).transpose() + up.normalized()).norm(), 1e-15);
       if (speed_m_s < 5e3) {
         EXPECT_EQ(axes, before);

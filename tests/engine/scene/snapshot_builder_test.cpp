@@ -336,6 +336,48 @@ TEST(SnapshotBuilder, PassesTheFallbackOfTheRollOn) {
   EXPECT_TRUE(builder.build(shot).roll_is_fallback);
 }
 
+/// Straight up, or by a hair aside.
+class Rising final : public Propagator {
+ public:
+  explicit Rising(double aside_m_s) : aside_m_s_(aside_m_s) {}
+  [[nodiscard]] OrbitState at(Epoch /*t*/) const noexcept override {
+    return {{{7e6, 1e5, 2e5}}, {{7.0, 0.1, 0.2 + aside_m_s_}}};
+  }
+
+ private:
+  double aside_m_s_;
+};
+
+TEST(SnapshotBuilder, SaysWhereTheTargetsAttitudeHasNoAnswerOfItsOwn) {
+  const Flyby flyby;
+  const Shot shot = tracked_shot(flyby, kClosestOfPass3_s);
+  const Rising straight(0.0);
+  const Rising aside(1e-6);
+  SceneSpec spec = spec_of(flyby);
+  EXPECT_FALSE(SnapshotBuilder(spec, flyby.camera, flyby.target).build(shot).attitude_is_fallback);
+  EXPECT_FALSE(SnapshotBuilder(spec, flyby.camera, aside).build(shot).attitude_is_fallback);
+  EXPECT_TRUE(SnapshotBuilder(spec, flyby.camera, straight).build(shot).attitude_is_fallback);
+  // One that is held to the stars needs no orbit.
+  spec.target_attitude.kind = AttitudeKind::kInertial;
+  EXPECT_FALSE(SnapshotBuilder(spec, flyby.camera, straight).build(shot).attitude_is_fallback);
+}
+
+TEST(SnapshotBuilder, AMicrosecondMovesTheImageByItsOwnShare) {
+  // A Julian date in one double is 40 us wide: it would step by 6 px here, or not at all.
+  const Flyby flyby;
+  const SnapshotBuilder builder(spec_of(flyby), flyby.camera, flyby.target);
+  Shot shot = tracked_shot(flyby, kClosestOfPass3_s);
+  const Snapshot before = builder.build(shot);
+  shot.shutter_open += std::chrono::microseconds(1);
+  const Snapshot after = builder.build(shot);
+  const double moved_px =
+      std::hypot(after.target_px.u - before.target_px.u, after.target_px.v - before.target_px.v);
+  const double want_px =
+      before.line_of_sight_rate_rad_s * 1e-6 * CameraGeometry{}.pixels_per_radian();
+  EXPECT_NEAR(want_px, 0.146, 0.001);
+  EXPECT_NEAR(moved_px / want_px, 1.0, 0.01);
+}
+
 /// The shot of a camera that swings along its x by a sine, so many whole swings in the exposure.
 Shot swinging_shot(const Flyby& flyby, double amplitude_rad, double swings) {
   Shot shot = tracked_shot(flyby, kClosestOfPass3_s);
