@@ -34,10 +34,6 @@ const std::array<std::array<float, 4>, kPhases + 1>& cubics() noexcept {
   return kTable;
 }
 
-float keep(float x, RadianceQuantity /*of*/) noexcept { return x; }
-/// A share stays one.
-float keep(float x, CoverQuantity /*of*/) noexcept { return std::clamp(x, 0.0F, 1.0F); }
-
 /// Calls work(place) along the sides of a region.
 template <class Work>
 void along_sides(const PixelRect& r, const Work& work) noexcept {
@@ -99,7 +95,7 @@ CurvedRenderer::CurvedRenderer(const CameraGeometry& camera, const GridWish& wis
   nodes_.reserve(at(most.width() / kNode + 3) * at(most.height() / kNode + 3));
   spare_grid_.reserve(most.width() * s, most.height() * s);
   spare_cover_.reserve(most.width() * s, most.height() * s);
-  (void)cubics();
+  (void)cubics();  // made now, not in the first frame
 }
 
 RenderReport CurvedRenderer::render(const Snapshot& snapshot, Budget budget,
@@ -121,8 +117,7 @@ RenderReport CurvedRenderer::render(const Snapshot& snapshot, Budget budget,
     const PixelRect from = region;
     region = bent_region(bend, from);
     find_nodes(bend, region);
-    draw(from, region, out.oversampling, grid, spare_grid_);
-    draw(from, region, out.oversampling, cover, spare_cover_);
+    draw(from, region, out.oversampling, grid, cover);
   };
   if (out.companions_in_sight && !out.targets_region.empty())
     redraw(out.targets_region, out.targets_grid, out.targets_cover);
@@ -166,17 +161,21 @@ void CurvedRenderer::find_nodes(const Bend& bend, const PixelRect& region) noexc
   });
 }
 
-template <class Quantity>
 void CurvedRenderer::draw(const PixelRect& from_region, const PixelRect& region, int oversampling,
-                          Image<Quantity>& image, Image<Quantity>& spare) noexcept {
-  std::swap(image, spare);
-  image.resize(region.width() * oversampling, region.height() * oversampling);
-  const Image<Quantity>& from = spare;
+                          RadianceImage& grid, CoverImage& cover) noexcept {
+  std::swap(grid, spare_grid_);
+  std::swap(cover, spare_cover_);
+  grid.resize(region.width() * oversampling, region.height() * oversampling);
+  cover.resize(grid.width(), grid.height());
+  const RadianceImage& from = spare_grid_;
+  ENSURE(spare_cover_.pixels().size() == from.pixels().size());
   const double cell_px = 1.0 / oversampling;
   const auto& weights = cubics();
-  pool_.rows(0, image.height(), [&](int y) {
-    const auto to = image.row(y);
-    std::ranges::fill(to, 0.0F);
+  pool_.rows(0, grid.height(), [&](int y) {
+    const auto light = grid.row(y);
+    const auto share = cover.row(y);
+    std::ranges::fill(light, 0.0F);
+    std::ranges::fill(share, 0.0F);
     const double down_px = (y + 0.5) * cell_px;  // from the region's upper side
     const int node_y = static_cast<int>(down_px) / kNode;
     const double t = down_px / kNode - node_y;
@@ -186,7 +185,7 @@ void CurvedRenderer::draw(const PixelRect& from_region, const PixelRect& region,
       return PixelPoint{above[x].u + t * (below[x].u - above[x].u),
                         above[x].v + t * (below[x].v - above[x].v)};
     };
-    for (int x = 0; x < image.width(); ++x) {
+    for (int x = 0; x < grid.width(); ++x) {
       const double across_px = (x + 0.5) * cell_px;
       const int node_x = static_cast<int>(across_px) / kNode;
       const double s = across_px / kNode - node_x;
@@ -205,16 +204,22 @@ void CurvedRenderer::draw(const PixelRect& from_region, const PixelRect& region,
       const int first_y = static_cast<int>(std::floor(v));
       const auto& across = weights[at(static_cast<int>(std::lround((u - first_x) * kPhases)))];
       const auto& down = weights[at(static_cast<int>(std::lround((v - first_y) * kPhases)))];
-      float sum = 0;
+      float light_sum = 0;
+      float share_sum = 0;
       for (int j = std::max(-kBefore, -first_y); j <= std::min(kAfter, from.height() - 1 - first_y);
            ++j) {
-        float row = 0;
+        float light_row = 0;
+        float share_row = 0;
         for (int i = std::max(-kBefore, -first_x);
-             i <= std::min(kAfter, from.width() - 1 - first_x); ++i)
-          row += across[at(i + kBefore)] * from.at(first_x + i, first_y + j);
-        sum += down[at(j + kBefore)] * row;
+             i <= std::min(kAfter, from.width() - 1 - first_x); ++i) {
+          light_row += across[at(i + kBefore)] * from.at(first_x + i, first_y + j);
+          share_row += across[at(i + kBefore)] * spare_cover_.at(first_x + i, first_y + j);
+        }
+        light_sum += down[at(j + kBefore)] * light_row;
+        share_sum += down[at(j + kBefore)] * share_row;
       }
-      to[at(x)] = keep(sum, Quantity{});
+      light[at(x)] = light_sum;
+      share[at(x)] = std::clamp(share_sum, 0.0F, 1.0F);
     }
   });
 }

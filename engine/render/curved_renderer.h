@@ -36,9 +36,8 @@ class CurvedRenderer final : public Renderer {
 
   [[nodiscard]] PixelRect bent_region(const Bend& bend, const PixelRect& region) const noexcept;
   void find_nodes(const Bend& bend, const PixelRect& region) noexcept;
-  template <class Quantity>
   void draw(const PixelRect& from_region, const PixelRect& region, int oversampling,
-            Image<Quantity>& image, Image<Quantity>& spare) noexcept;
+            RadianceImage& grid, CoverImage& cover) noexcept;
 
   CameraGeometry camera_;
   GridWish wish_;
