@@ -1,0 +1,22 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "engine/scene/mesh.h"
+
+namespace engine {
+
+/// A mesh as a file describes it: each triangle belongs to a named group, which may be moved by
+/// itself (a solar panel) before rays see any of it.
+struct GroupedMesh {
+  Mesh mesh;
+  std::vector<std::string> group_names;
+  std::vector<std::uint32_t> group;  ///< by triangle: index into group_names
+
+  /// The triangles of one group and no other vertex than theirs; all materials keep their index.
+  [[nodiscard]] Mesh part(std::uint32_t index) const;
+};
+
+}  // namespace engine
