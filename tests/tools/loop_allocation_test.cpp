@@ -13,6 +13,7 @@
 
 #include "drivers/mock_link.h"
 #include "tests/support/no_alloc.h"
+#include "tools/starloop/rig.h"
 #include "tools/starloop/scenario.h"
 
 namespace {

@@ -14,6 +14,7 @@
 #include "engine/core/constants.h"
 #include "engine/orbit/kepler.h"
 #include "engine/orbit/utc.h"
+#include "tools/starloop/rig.h"
 
 namespace {
 

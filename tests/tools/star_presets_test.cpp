@@ -10,6 +10,7 @@
 
 #include "engine/core/constants.h"
 #include "engine/scene/star_zones.h"
+#include "tools/starloop/rig.h"
 #include "tools/starloop/scenario.h"
 
 namespace {

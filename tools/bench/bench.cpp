@@ -11,6 +11,7 @@
 #include "engine/detector/noise_lanes.h"
 #include "engine/orbit/kepler.h"
 #include "engine/orbit/sun_track.h"
+#include "tools/starloop/rig.h"
 #include "tools/starloop/scenario.h"
 
 namespace {

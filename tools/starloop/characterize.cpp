@@ -6,6 +6,7 @@
 #include "tools/characterize/camera_report.h"
 #include "tools/characterize/report_files.h"
 #include "tools/starloop/plot_script.h"
+#include "tools/starloop/rig.h"
 #include "tools/starloop/subcommands.h"
 
 namespace starloop {

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tools/starloop/connections.h"
+#include "tools/starloop/rig.h"
 #include "tools/starloop/run_folder.h"
 
 namespace starloop {

@@ -11,6 +11,7 @@
 #include "engine/scene/snapshot_builder.h"
 #include "tools/starloop/file_names.h"
 #include "tools/starloop/plot_script.h"
+#include "tools/starloop/rig.h"
 #include "tools/starloop/subcommands.h"
 
 namespace starloop {

@@ -8,7 +8,7 @@
 
 #include "engine/orbit/passes.h"
 #include "engine/orbit/sun_track.h"
-#include "tools/starloop/scenario.h"
+#include "tools/starloop/rig.h"
 
 namespace starloop {
 

@@ -10,6 +10,7 @@
 #include "tools/starloop/orbit_notes.h"
 #include "tools/starloop/pass_report.h"
 #include "tools/starloop/plot_script.h"
+#include "tools/starloop/rig.h"
 #include "tools/starloop/subcommands.h"
 
 namespace starloop {

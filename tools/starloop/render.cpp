@@ -11,6 +11,7 @@
 #include "tools/starloop/frame_sheet.h"
 #include "tools/starloop/orbit_notes.h"
 #include "tools/starloop/picture.h"
+#include "tools/starloop/rig.h"
 #include "tools/starloop/subcommands.h"
 
 namespace starloop {

@@ -11,6 +11,7 @@
 #include "engine/core/fits.h"
 #include "hil/frame_writer.h"
 #include "hil/no_commands.h"
+#include "tools/starloop/rig.h"
 #include "tools/starloop/run_folder.h"
 #include "tools/starloop/subcommands.h"
 

@@ -11,6 +11,7 @@
 #include "hil/steady_clock.h"
 #include "tools/starloop/flight.h"
 #include "tools/starloop/observer.h"
+#include "tools/starloop/rig.h"
 #include "tools/starloop/soak_verdict.h"
 #include "tools/starloop/subcommands.h"
 

@@ -10,6 +10,7 @@
 #include "engine/core/fits.h"
 #include "tools/starloop/file_names.h"
 #include "tools/starloop/plot_script.h"
+#include "tools/starloop/rig.h"
 #include "tools/starloop/subcommands.h"
 
 namespace starloop {
