@@ -81,6 +81,14 @@ void add_run(const PixelRect& run, FrameTruth& truth, TruthMask& mask) noexcept 
                                 std::max(box.right, run.right), run.bottom};
 }
 
+void tell_parts(const Snapshot& snapshot, FrameTruth& truth) noexcept {
+  truth.parts = snapshot.parts;
+  for (std::size_t i = 0; i < snapshot.parts; ++i) {
+    const PartView& view = snapshot.part[i];
+    truth.part[i] = {view.angle_rad, view.second_angle_rad, view.at_limit};
+  }
+}
+
 void tell_companions(const Snapshot& snapshot, const RenderReport& render,
                      FrameTruth& truth) noexcept {
   truth.companions = snapshot.companions;
@@ -170,6 +178,7 @@ FrameReport ImagingChain::expose(const Shot& shot, Budget budget, DnImage& out,
   truth.roll_is_fallback = snapshot.roll_is_fallback;
   truth.attitude_is_fallback = snapshot.attitude_is_fallback;
   tell_companions(snapshot, report.render, truth);
+  tell_parts(snapshot, truth);
   const auto pixels = out.pixels();
   report.peak_dn = *std::max_element(pixels.begin(), pixels.end());
   return report;

@@ -26,6 +26,13 @@ struct CompanionTruth {
   double sun_irradiance_w_m2 = 0;
 };
 
+/// Of a part that turns by itself, at mid-exposure.
+struct PartTruth {
+  double angle_rad = 0;  ///< about its axis, from where the mesh has it
+  double second_angle_rad = 0;
+  bool at_limit = false;  ///< a limit keeps it from its place
+};
+
 /// What a frame really shows, before noise. The software under test never sees it. With companions
 /// in sight the light of the target is what of it is seen past them, its mask too.
 struct FrameTruth {
@@ -53,6 +60,8 @@ struct FrameTruth {
   bool attitude_is_fallback = false;
   std::array<CompanionTruth, kMostCompanions> companion{};  ///< the first `companions` of them
   std::size_t companions = 0;
+  std::array<PartTruth, kMostParts> part{};  ///< the first `parts` of them
+  std::size_t parts = 0;
 };
 
 /// The pixels where the target's light, free of noise, is above one sigma of the noise of a pixel

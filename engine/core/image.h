@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -93,6 +94,13 @@ struct PixelRect {
     return {left > other.left ? left : other.left, top > other.top ? top : other.top,
             right < other.right ? right : other.right,
             bottom < other.bottom ? bottom : other.bottom};
+  }
+  /// The smallest that holds both.
+  [[nodiscard]] PixelRect joined_with(const PixelRect& other) const noexcept {
+    if (empty()) return other;
+    if (other.empty()) return *this;
+    return {std::min(left, other.left), std::min(top, other.top), std::max(right, other.right),
+            std::max(bottom, other.bottom)};
   }
 };
 

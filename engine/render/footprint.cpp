@@ -49,14 +49,6 @@ Polygon clipped(const Polygon& in, double PixelPoint::*axis, double edge, double
   return out;
 }
 
-/// The smallest rectangle that holds both.
-PixelRect around(const PixelRect& a, const PixelRect& b) noexcept {
-  if (a.empty()) return b;
-  if (b.empty()) return a;
-  return {std::min(a.left, b.left), std::min(a.top, b.top), std::max(a.right, b.right),
-          std::max(a.bottom, b.bottom)};
-}
-
 }  // namespace
 
 Footprint::Footprint(const CameraGeometry& camera, int beyond_frame_px, std::size_t vertices)
@@ -108,7 +100,7 @@ void Footprint::mark(const PixelRect& box) noexcept {
                ? Span{inside.left, inside.right}
                : Span{std::min(span.begin, inside.left), std::max(span.end, inside.right)};
   }
-  region_ = around(region_, inside);
+  region_ = region_.joined_with(inside);
 }
 
 PixelRect Footprint::add(const Mesh& mesh, const BodyView& view) noexcept {
@@ -123,20 +115,19 @@ PixelRect Footprint::add(const Mesh& mesh, const BodyView& view) noexcept {
                    std::clamp(p.v, -kOutside_px, kOutside_px)};
   }
   for (const Mesh::Triangle& triangle : mesh.triangles) mark(box_round(triangle));
-  measure_visible(mesh);
+  image_area_ = area_of(mesh);
   const PixelRect own = region_;
-  region_ = around(others, own);
+  region_ = others.joined_with(own);
   return own;
 }
 
-void Footprint::measure_visible(const Mesh& mesh) noexcept {
+Footprint::ImageArea Footprint::area_of(const Mesh& mesh) const noexcept {
   const PixelRect frame = camera_.frame();
   const double left = frame.left - 0.5;
   const double top = frame.top - 0.5;
   const double right = frame.right - 0.5;
   const double bottom = frame.bottom - 0.5;
-  double all = 0;
-  double inside = 0;
+  ImageArea sum;
   for (const Mesh::Triangle& triangle : mesh.triangles) {
     Polygon image;
     int within = 0;
@@ -149,18 +140,18 @@ void Footprint::measure_visible(const Mesh& mesh) noexcept {
     }
     if (behind) continue;
     const double area = area_px2(image);
-    all += area;
+    sum.all_px2 += area;
     if (within == 3) {
-      inside += area;
+      sum.in_frame_px2 += area;
       continue;
     }
     image = clipped(image, &PixelPoint::u, left, 1.0);
     image = clipped(image, &PixelPoint::u, right, -1.0);
     image = clipped(image, &PixelPoint::v, top, 1.0);
     image = clipped(image, &PixelPoint::v, bottom, -1.0);
-    inside += area_px2(image);
+    sum.in_frame_px2 += area_px2(image);
   }
-  visible_fraction_ = all > 0.0 ? std::min(1.0, inside / all) : 0.0;
+  return sum;
 }
 
 }  // namespace engine

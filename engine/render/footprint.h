@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <vector>
 
 #include "engine/core/image.h"
@@ -25,12 +26,27 @@ class Footprint {
   }
   void clear() noexcept;
   /// Marks one body more, of as many vertices at most as the constructor was told; the pixels round
-  /// it. visible_fraction() is its own until the next is added.
+  /// it.
   PixelRect add(const Mesh& mesh, const BodyView& view) noexcept;
 
-  /// Of the area that all triangles have on the detector's plane, the share that lies in the frame;
-  /// 0 when there is no area. A triangle with a corner behind the camera counts for none.
-  [[nodiscard]] double visible_fraction() const noexcept { return visible_fraction_; }
+  /// What triangles have on the detector's plane, each for itself. One with a corner behind the
+  /// camera counts for none.
+  struct ImageArea {
+    double all_px2 = 0;
+    double in_frame_px2 = 0;
+    ImageArea& operator+=(const ImageArea& more) noexcept {
+      all_px2 += more.all_px2;
+      in_frame_px2 += more.in_frame_px2;
+      return *this;
+    }
+    /// The share that lies in the frame; 0 when there is no area.
+    [[nodiscard]] double visible_fraction() const noexcept {
+      return all_px2 > 0.0 ? std::min(1.0, in_frame_px2 / all_px2) : 0.0;
+    }
+  };
+  /// Of the body that was added last.
+  [[nodiscard]] const ImageArea& image_area() const noexcept { return image_area_; }
+  [[nodiscard]] double visible_fraction() const noexcept { return image_area_.visible_fraction(); }
 
   /// Of the marked pixels; empty when all is out of sight.
   [[nodiscard]] PixelRect region() const noexcept { return region_; }
@@ -53,12 +69,12 @@ class Footprint {
  private:
   void mark(const PixelRect& box) noexcept;
   [[nodiscard]] PixelRect box_round(const Mesh::Triangle& triangle) const noexcept;
-  void measure_visible(const Mesh& mesh) noexcept;
+  [[nodiscard]] ImageArea area_of(const Mesh& mesh) const noexcept;
 
   CameraGeometry camera_;
   PixelRect limits_;
   PixelRect region_;
-  double visible_fraction_ = 0;
+  ImageArea image_area_;
   std::vector<std::uint8_t> mask_;
   std::vector<Span> spans_;
   std::vector<PixelPoint> corners_;

@@ -48,10 +48,9 @@ std::uint32_t each_of(int samples, int side, int replicates) noexcept {
 }  // namespace
 
 PathTracer::PathTracer(const RenderSpec& spec, std::shared_ptr<TracedTarget> target,
-                       WorkerPool& pool,
-                       const std::vector<std::shared_ptr<TracedTarget>>& companions)
+                       WorkerPool& pool, const OtherBodies& others)
     : spec_(spec),
-      bodies_(std::move(target), companions),
+      bodies_(std::move(target), others),
       bounced_(at_each(bodies_, BounceRules{spec.bounces, spec.sampler, spec.exact_caustics})),
       footprint_(spec.camera, spec.grid.beyond_frame_px, bodies_.most_vertices()),
       noise_(spec.camera.frame().grown_by(spec.grid.beyond_frame_px), spec.noise),
@@ -105,23 +104,31 @@ RenderReport PathTracer::render(const Snapshot& snapshot, Budget budget, Radianc
 /// footprint_, and of each of frames_ the pixels.
 void PathTracer::find_bodies(const Snapshot& snapshot, RenderReport& report) noexcept {
   footprint_.clear();
+  std::array<Footprint::ImageArea, 1 + kMostCompanions> area_of_owner{};
   for (std::size_t i = 0; i < bodies_.count(); ++i) {
-    frames_[i].seen = footprint_.add(bodies_.shape(i).mesh, TracedBodies::view(snapshot, i));
-    double& visible =
-        i == 0 ? report.visible_fraction : report.visible_fraction_of_companion[i - 1];
-    visible = footprint_.visible_fraction();
+    frames_[i].seen = footprint_.add(bodies_.shape(i).mesh, bodies_.view(snapshot, i));
+    area_of_owner[bodies_.owner(i)] += footprint_.image_area();
   }
+  report.visible_fraction = area_of_owner[0].visible_fraction();
+  for (std::size_t i = 0; i < kMostCompanions; ++i)
+    report.visible_fraction_of_companion[i] = area_of_owner[i + 1].visible_fraction();
 }
 
 void PathTracer::size_images(Radiance& out) const noexcept {
   const int s = out.oversampling = spec_.grid.oversampling;
   out.grid.resize(out.region.width() * s, out.region.height() * s);
   out.cover.resize(out.grid.width(), out.grid.height());
-  out.companions_in_sight =
-      std::any_of(frames_.begin() + 1, frames_.end(),
-                  [](const TracedFrame& frame) { return !frame.seen.empty(); });
-  out.targets_region = out.companions_in_sight ? frames_[0].seen : PixelRect{};
-  if (out.targets_region.empty()) out.targets_region = {};
+  PixelRect targets;
+  out.companions_in_sight = false;
+  for (std::size_t i = 0; i < bodies_.count(); ++i) {
+    const PixelRect& seen = frames_[i].seen;
+    if (bodies_.owner(i) == 0) {
+      targets = targets.joined_with(seen);
+    } else {
+      out.companions_in_sight = out.companions_in_sight || !seen.empty();
+    }
+  }
+  out.targets_region = out.companions_in_sight ? targets : PixelRect{};
   out.targets_grid.resize(out.targets_region.width() * s, out.targets_region.height() * s);
   out.targets_cover.resize(out.targets_grid.width(), out.targets_grid.height());
 }
@@ -132,7 +139,7 @@ void PathTracer::light_up(const Snapshot& snapshot, RenderReport& report) noexce
   const double glint_radius_rad = spec_.sun_disc == SunDisc::kOff ? 0.0 : kSunAngularRadius_rad;
   const double sun_radius_rad = sun_radius_for(snapshot, report);
   for (std::size_t i = 0; i < bodies_.count(); ++i) {
-    const BodyView& view = TracedBodies::view(snapshot, i);
+    const BodyView& view = bodies_.view(snapshot, i);
     const PixelRect seen = frames_[i].seen;
     frames_[i] =
         TracedFrame(view, spec_.camera, bodies_.shape(i).bounding_radius_m, sun_radius_rad);
@@ -165,7 +172,7 @@ double PathTracer::sun_radius_for(const Snapshot& snapshot, RenderReport& report
   const double widest_m = 2.0 * kSunAngularRadius_rad * bodies_.longest_shadow_m(snapshot);
   double range_m = snapshot.camera.m.norm();
   for (std::size_t i = 1; i < bodies_.count(); ++i)
-    range_m = std::min(range_m, TracedBodies::view(snapshot, i).camera.m.norm());
+    range_m = std::min(range_m, bodies_.view(snapshot, i).camera.m.norm());
   const double pixel_m = range_m * spec_.camera.ifov_rad();
   const bool shows = widest_m > kHardEdge_px * pixel_m;
   constexpr double kNotKnown = std::numeric_limits<double>::quiet_NaN();

@@ -31,9 +31,9 @@ namespace engine {
 /// Thread: loop. Loop-safe but for the constructor.
 class PathTracer final : public Renderer {
  public:
-  /// Snapshots must have as many companions. Some may share their mesh: one TracedTarget.
+  /// Snapshots must have as many companions and parts.
   PathTracer(const RenderSpec& spec, std::shared_ptr<TracedTarget> target, WorkerPool& pool,
-             const std::vector<std::shared_ptr<TracedTarget>>& companions = {});
+             const OtherBodies& others = {});
 
   RenderReport render(const Snapshot& snapshot, Budget budget, Radiance& out) noexcept override;
 

@@ -68,33 +68,35 @@ RenderSpec read_render(const ConfigTable& table) {
   return spec;
 }
 
-std::unique_ptr<Renderer> make_renderer(
-    const RenderSpec& spec, std::shared_ptr<TracedTarget> target, WorkerPool& pool,
-    const std::vector<std::shared_ptr<TracedTarget>>& companions) {
+std::unique_ptr<Renderer> make_renderer(const RenderSpec& spec,
+                                        std::shared_ptr<TracedTarget> target, WorkerPool& pool,
+                                        const OtherBodies& others) {
   RenderSpec settled = with_bounces_settled(spec, *target);
-  for (const auto& companion : companions) {
-    const RenderSpec its = with_bounces_settled(spec, *companion);
+  const auto settle_for = [&](const TracedTarget& other) {
+    const RenderSpec its = with_bounces_settled(spec, other);
     if (its.bounces > settled.bounces) settled = its;
-  }
-  ENSURE(settled.method == RenderMethod::kPaths || companions.empty());
+  };
+  for (const auto& companion : others.companions) settle_for(*companion);
+  for (const OtherBodies::Part& part : others.parts) settle_for(*part.shape);
+  ENSURE(settled.method == RenderMethod::kPaths || others.empty());
   const auto resolving = [&](const std::shared_ptr<TracedTarget>& shape) {
     std::unique_ptr<Renderer> made;
     if (settled.method == RenderMethod::kPaths) {
-      made = std::make_unique<PathTracer>(settled, shape, pool, companions);
+      made = std::make_unique<PathTracer>(settled, shape, pool, others);
     } else {
       made = std::make_unique<LatticeRenderer>(settled, shape, pool);
     }
     return made;
   };
   std::unique_ptr<Renderer> resolved = resolving(target);
-  if (!target->coarser.empty() && companions.empty()) {
+  if (!target->coarser.empty() && others.empty()) {
     std::vector<std::unique_ptr<Renderer>> levels;
     levels.push_back(std::move(resolved));
     for (const CoarserTarget& level : target->coarser) levels.push_back(resolving(level.target));
     resolved = std::make_unique<LevelledRenderer>(settled, *target, std::move(levels));
   }
   // Bodies that may hide and shade each other have no light as a whole.
-  const bool as_a_whole = settled.far_target != FarTargetForm::kResolved && companions.empty();
+  const bool as_a_whole = settled.far_target != FarTargetForm::kResolved && others.empty();
   if (as_a_whole)
     resolved = std::make_unique<FarTarget>(settled, std::move(resolved), std::move(target), pool);
   if (settled.camera.distortion.none()) return resolved;

@@ -6,6 +6,7 @@
 
 #include "engine/core/config_reader.h"
 #include "engine/core/worker_pool.h"
+#include "engine/render/other_bodies.h"
 #include "engine/render/renderer.h"
 #include "engine/render/sobol.h"
 #include "engine/scene/brdf.h"
@@ -76,9 +77,10 @@ struct RenderSpec {
 [[nodiscard]] RenderSpec read_render(const ConfigTable& table);
 
 /// The renderer that the spec asks for; a target with coarser meshes is drawn with them, but for
-/// one with companions. May throw. Pre: with companions the method is kPaths.
-[[nodiscard]] std::unique_ptr<Renderer> make_renderer(
-    const RenderSpec& spec, std::shared_ptr<TracedTarget> target, WorkerPool& pool,
-    const std::vector<std::shared_ptr<TracedTarget>>& companions = {});
+/// one with other bodies. May throw. Pre: with those the method is kPaths.
+[[nodiscard]] std::unique_ptr<Renderer> make_renderer(const RenderSpec& spec,
+                                                      std::shared_ptr<TracedTarget> target,
+                                                      WorkerPool& pool,
+                                                      const OtherBodies& others = {});
 
 }  // namespace engine

@@ -178,7 +178,7 @@ void RowTracer::send_camera_rays() noexcept {
 void RowTracer::take_hits(std::size_t body, const Look& look, std::size_t used) noexcept {
   const RayPacket& rays = look.rays;
   Desk& desk = desks_[body];
-  const std::size_t cells = body > 0 ? companions_cells() : 0;
+  const std::size_t cells = is_targets(body) ? 0 : companions_cells();
   const bool earth = (*frames_)[body].lamps.earth != nullptr;
   std::array<SurfacePoint, kLanes> points;
   bool any = false;

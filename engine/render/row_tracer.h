@@ -115,6 +115,10 @@ class RowTracer {
   };
 
   [[nodiscard]] bool several() const noexcept { return bodies_.count() > 1; }
+  /// What the target and its parts send and cover; the rest is the companions'.
+  [[nodiscard]] bool is_targets(std::size_t body) const noexcept {
+    return bodies_.owner(body) == 0;
+  }
   /// The target's slots and cells come first, those of all companions after them.
   [[nodiscard]] std::size_t companions_slots() const noexcept { return slot(columns_, 0, 0); }
   [[nodiscard]] std::size_t companions_cells() const noexcept { return cell_of(columns_, 0); }
@@ -139,7 +143,7 @@ class RowTracer {
   /// Light of a camera's sample that meets this body first.
   [[nodiscard]] std::uint32_t slot_at(std::size_t body, std::size_t lane) const noexcept {
     return camera_.slot[lane] +
-           static_cast<std::uint32_t>(body > 0 ? companions_slots() : std::size_t{0});
+           static_cast<std::uint32_t>(is_targets(body) ? std::size_t{0} : companions_slots());
   }
   void ask(std::size_t body, ShadowQueue& queue, RayCoherence coherence, RayCounts& counts,
            const SurfacePoint& from, const Eigen::Vector3f& toward, std::uint32_t slot,

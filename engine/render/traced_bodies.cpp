@@ -35,15 +35,21 @@ bool reaches(const Vector3d& origin, const Vector3d& direction, double radius_m)
 
 }  // namespace
 
-TracedBodies::TracedBodies(std::shared_ptr<TracedTarget> target,
-                           const std::vector<std::shared_ptr<TracedTarget>>& companions) {
-  ENSURE(companions.size() <= kMostCompanions);
-  Facets* facets = &target->facets;
-  bodies_.push_back({std::move(target), nullptr, facets});
-  for (const std::shared_ptr<TracedTarget>& shape : companions) {
+TracedBodies::TracedBodies(std::shared_ptr<TracedTarget> target, const OtherBodies& others)
+    : companions_(others.companions.size()) {
+  ENSURE(companions_ <= kMostCompanions);
+  ENSURE(others.parts.size() <= kMostParts);
+  Facets* const targets = &target->facets;
+  bodies_.push_back({std::move(target), nullptr, targets, 0});
+  const auto add = [this](const std::shared_ptr<TracedTarget>& shape, std::size_t owner) {
     auto own = std::make_unique<Facets>(shape->facets);
-    facets = own.get();
-    bodies_.push_back({shape, std::move(own), facets});
+    Facets* const facets = own.get();
+    bodies_.push_back({shape, std::move(own), facets, owner});
+  };
+  for (const auto& shape : others.companions) add(shape, count());
+  for (const OtherBodies::Part& part : others.parts) {
+    ENSURE(part.owner <= companions_);
+    add(part.shape, part.owner);
   }
   poses_.resize(count() * count());
 }
@@ -56,12 +62,13 @@ std::size_t TracedBodies::most_vertices() const noexcept {
 
 void TracedBodies::place(const Snapshot& snapshot) noexcept {
   if (count() == 1) return;
-  ENSURE(snapshot.companions + 1 >= count());
+  ENSURE(snapshot.companions >= companions_);
+  ENSURE(snapshot.parts + 1 + companions_ >= count());
   const auto centre = [&](std::size_t body) -> Vector3d {
-    return body == 0 ? Vector3d::Zero() : snapshot.companion[body - 1].centre.m;
+    return body == 0 ? Vector3d::Zero() : other(snapshot, body).centre.m;
   };
   const auto turn = [&](std::size_t body) -> Matrix3d {
-    return body == 0 ? Matrix3d::Identity() : snapshot.companion[body - 1].from_target.matrix;
+    return body == 0 ? Matrix3d::Identity() : other(snapshot, body).from_target.matrix;
   };
   for (std::size_t from = 0; from < count(); ++from) {
     for (std::size_t to = 0; to < count(); ++to) {

@@ -3,6 +3,7 @@
 #include <memory>
 #include <vector>
 
+#include "engine/render/other_bodies.h"
 #include "engine/render/traced_target.h"
 #include "engine/scene/snapshot.h"
 
@@ -14,7 +15,8 @@ struct BodyHits {
   std::array<std::uint8_t, RayPacket::kLanes> body{};
 };
 
-/// The target and its companions as rays meet them; body 0 is the target.
+/// The target, its companions and their parts as rays meet them, in this order; body 0 is the
+/// target.
 ///
 /// A ray starts at a body and runs in its axes. Where it can meet another body's bounding sphere,
 /// it is taken there in double, moved up to the sphere, and traced in single precision in that
@@ -24,11 +26,10 @@ struct BodyHits {
 /// light_up(): loop. Loop-safe but for the constructor.
 class TracedBodies {
  public:
-  static constexpr std::size_t kMost = 1 + kMostCompanions;
+  static constexpr std::size_t kMost = 1 + kMostCompanions + kMostParts;
 
-  /// Pre: at most kMostCompanions. Companions may share their TracedTarget, also with the target.
-  TracedBodies(std::shared_ptr<TracedTarget> target,
-               const std::vector<std::shared_ptr<TracedTarget>>& companions);
+  /// Pre: at most kMostCompanions and kMostParts.
+  TracedBodies(std::shared_ptr<TracedTarget> target, const OtherBodies& others);
 
   [[nodiscard]] std::size_t count() const noexcept { return bodies_.size(); }
   [[nodiscard]] const TracedTarget& shape(std::size_t body) const noexcept {
@@ -37,13 +38,15 @@ class TracedBodies {
   [[nodiscard]] const Facets& facets(std::size_t body) const noexcept {
     return *bodies_[body].facets;
   }
-  /// Pre: the snapshot has that companion.
-  [[nodiscard]] static const BodyView& view(const Snapshot& snapshot, std::size_t body) noexcept {
-    return body == 0 ? snapshot : static_cast<const BodyView&>(snapshot.companion[body - 1]);
+  /// The body that it is, or is a part of: 0 the target, n companion n - 1.
+  [[nodiscard]] std::size_t owner(std::size_t body) const noexcept { return bodies_[body].owner; }
+  /// Pre: the snapshot has that body.
+  [[nodiscard]] const BodyView& view(const Snapshot& snapshot, std::size_t body) const noexcept {
+    return body == 0 ? snapshot : static_cast<const BodyView&>(other(snapshot, body));
   }
   [[nodiscard]] std::size_t most_vertices() const noexcept;
 
-  /// Where the bodies are from now on. Pre: the snapshot has as many companions, or more.
+  /// Where the bodies are from now on. Pre: the snapshot has as many companions and parts, or more.
   void place(const Snapshot& snapshot) noexcept;
   /// The facets of one, as Facets has it.
   void light_up(std::size_t body, const BodyView& view, double sun_radius_rad) noexcept {
@@ -73,6 +76,7 @@ class TracedBodies {
     std::shared_ptr<TracedTarget> shape;
     std::unique_ptr<Facets> own_facets;  ///< of a companion: light falls on it as it lies
     Facets* facets = nullptr;
+    std::size_t owner = 0;
   };
   /// Of one body's axes in another's: place' = turn * (place - centre).
   struct Pose {
@@ -81,6 +85,11 @@ class TracedBodies {
   };
   using Lengths = std::array<double, RayPacket::kLanes>;
 
+  [[nodiscard]] const CompanionView& other(const Snapshot& snapshot,
+                                           std::size_t body) const noexcept {
+    return body <= companions_ ? snapshot.companion[body - 1]
+                               : snapshot.part[body - 1 - companions_];
+  }
   [[nodiscard]] const Pose& pose(std::size_t from, std::size_t to) const noexcept {
     return poses_[from * bodies_.size() + to];
   }
@@ -88,6 +97,7 @@ class TracedBodies {
                            Lengths& skipped) const noexcept;
 
   std::vector<Body> bodies_;
+  std::size_t companions_ = 0;
   std::vector<Pose> poses_;  ///< from each to each
 };
 

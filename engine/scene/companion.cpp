@@ -1,5 +1,7 @@
 #include "engine/scene/companion.h"
 
+#include <algorithm>
+
 namespace engine {
 namespace {
 
@@ -11,7 +13,18 @@ OrbitalOffset read_offset(const ConfigTable& table) {
           table.number_or("cross_m", 0.0, near)};
 }
 
-CompanionSpec read_companion(const ConfigReader& config, const std::string& name) {
+/// The number of a body by its name, as CompanionSpec::beside has it.
+std::size_t read_beside(const ConfigTable& table, const std::vector<std::string>& names) {
+  const std::string name = table.text_or("beside", "target");
+  if (name == "target") return 0;
+  const auto it = std::ranges::find(names, name);
+  if (it == names.end())
+    table.fail("beside", "must be \"target\" or the name of a companion, got \"" + name + "\"");
+  return static_cast<std::size_t>(it - names.begin()) + 1;
+}
+
+CompanionSpec read_companion(const ConfigReader& config, const std::string& name,
+                             const std::vector<std::string>& names) {
   const ConfigTable all = config.table("companions");
   const std::string path = "companions." + name;
   const ConfigTable table = config.table(path);
@@ -23,6 +36,7 @@ CompanionSpec read_companion(const ConfigReader& config, const std::string& name
   const bool held = table.has("radial_m") || table.has("along_m") || table.has("cross_m");
   if (table.has("orbit")) {
     if (held) table.fail("orbit", "and radial_m, along_m, cross_m exclude each other");
+    if (table.has("beside")) table.fail("orbit", "and beside exclude each other");
     spec.orbit = read_orbit(config.table(path + ".orbit"));
     return spec;
   }
@@ -32,7 +46,22 @@ CompanionSpec read_companion(const ConfigReader& config, const std::string& name
              "beside the target");
   }
   spec.offset = read_offset(table);
+  spec.beside = read_beside(table, names);
   return spec;
+}
+
+/// Each chain of bodies that are held beside one another must end at one that is not.
+void need_an_orbit_each(const ConfigReader& config, const std::vector<CompanionSpec>& companions) {
+  for (const CompanionSpec& companion : companions) {
+    std::size_t steps = 0;
+    for (const CompanionSpec* at = &companion; !at->orbit && at->beside > 0; ++steps) {
+      at = &companions[at->beside - 1];
+      if (steps == companions.size()) {
+        config.table("companions." + companion.name)
+            .fail("beside", "leads back to where it began: nothing of this chain has an orbit");
+      }
+    }
+  }
 }
 
 }  // namespace
@@ -47,7 +76,8 @@ std::vector<CompanionSpec> read_companions(const ConfigReader& config) {
   }
   std::vector<CompanionSpec> companions;
   companions.reserve(names.size());
-  for (const std::string& name : names) companions.push_back(read_companion(config, name));
+  for (const std::string& name : names) companions.push_back(read_companion(config, name, names));
+  need_an_orbit_each(config, companions);
   return companions;
 }
 

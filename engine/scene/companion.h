@@ -17,11 +17,15 @@ struct CompanionSpec {
   std::string name;
   std::string mesh = "telescope";
   std::string mesh_where;          ///< the place in the scenario that names it
-  std::optional<OrbitSpec> orbit;  ///< none: it is held beside the target
+  std::optional<OrbitSpec> orbit;  ///< none: it is held beside another body
+  std::size_t beside = 0;          ///< 0: the target, n: companion n - 1
   OrbitalOffset offset;            ///< where it has no orbit of its own
-  AttitudeSpec attitude;           ///< from its own orbital frame, or the target's where it is held
+  /// From its own orbital frame; where it is held, from that of the body with an orbit that it is
+  /// held to in the end.
+  AttitudeSpec attitude;
 };
-/// Reads companions.<name> for each name below `companions`, kMostCompanions at most.
+/// Reads companions.<name> for each name below `companions`, kMostCompanions at most. None is held
+/// to itself, by others or directly.
 [[nodiscard]] std::vector<CompanionSpec> read_companions(const ConfigReader& config);
 
 /// A companion as it moves. The propagators outlive it.

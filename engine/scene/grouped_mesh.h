@@ -15,8 +15,9 @@ struct GroupedMesh {
   std::vector<std::string> group_names;
   std::vector<std::uint32_t> group;  ///< by triangle: index into group_names
 
-  /// The triangles of one group and no other vertex than theirs; all materials keep their index.
-  [[nodiscard]] Mesh part(std::uint32_t index) const;
+  /// The triangles of some groups and no other vertex than theirs; the mesh itself where that is
+  /// all of them. Materials keep their index. Pre: wanted has a place for each group.
+  [[nodiscard]] Mesh part(const std::vector<bool>& wanted) const;
 };
 
 }  // namespace engine

@@ -84,7 +84,16 @@ struct CompanionView : BodyView {
   Position<BodyFrame> centre;                    ///< in the target's body frame
   Rotation<BodyFrame, BodyFrame> from_target{};  ///< takes the target's axes to its own
 };
-inline constexpr std::size_t kMostCompanions = 8;
+inline constexpr std::size_t kMostCompanions = 32;
+
+/// A part of a body that turns by itself: its centre is its hinge.
+struct PartView : CompanionView {
+  std::size_t owner = 0;  ///< 0: the target, n: companion n - 1
+  double angle_rad = 0;   ///< about its axis, from where the mesh has it
+  double second_angle_rad = 0;
+  bool at_limit = false;  ///< a limit keeps it from its place
+};
+inline constexpr std::size_t kMostParts = 32;
 
 /// One exposure with its geometry resolved, at mid-exposure: the target's view, and all the rest.
 struct Snapshot : BodyView {
@@ -110,6 +119,8 @@ struct Snapshot : BodyView {
 
   std::array<CompanionView, kMostCompanions> companion{};  ///< the first `companions` of them
   std::size_t companions = 0;
+  std::array<PartView, kMostParts> part{};  ///< the first `parts` of them
+  std::size_t parts = 0;
 };
 
 }  // namespace engine

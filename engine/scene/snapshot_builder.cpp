@@ -1,6 +1,7 @@
 #include "engine/scene/snapshot_builder.h"
 
 #include <cmath>
+#include <utility>
 
 #include "engine/orbit/earth_rotation.h"
 #include "engine/orbit/visibility.h"
@@ -20,6 +21,23 @@ Lamp lamp_of(const Eigen::Vector3d& irradiance_w_m2, const Rotation<BodyFrame, J
 }
 
 }  // namespace
+
+SnapshotBuilder::SnapshotBuilder(const SceneSpec& spec, const Propagator& camera,
+                                 const Propagator& target, std::vector<Companion> companions,
+                                 std::vector<ArticulatedPart> parts)
+    : spec_(spec),
+      camera_(camera),
+      target_(target),
+      companions_(std::move(companions)),
+      parts_(std::move(parts)),
+      attitude_(spec.target_attitude, spec.epoch) {
+  ENSURE(companions_.size() <= kMostCompanions);
+  ENSURE(parts_.size() <= kMostParts);
+  for (const ArticulatedPart& part : parts_) {
+    ENSURE(part.spec().owner <= companions_.size());
+    ENSURE(part.spec().followed <= companions_.size());
+  }
+}
 
 PixelPoint SnapshotBuilder::image_of(const Propagator& body, SimTime t,
                                      const CameraAttitude& attitude) const noexcept {
@@ -139,31 +157,91 @@ EarthshineChoice SnapshotBuilder::light_by_earth(const SightLine& line, const Bo
   return choice;
 }
 
+SnapshotBuilder::Placed SnapshotBuilder::place(std::size_t body, const Shot& shot) const noexcept {
+  const Epoch middle = spec_.epoch + (shot.shutter_open + shot.exposure / 2).time_since_epoch();
+  if (body == 0) {
+    const SightLine line = sight_line(camera_, target_, middle, spec_.light_path);
+    return {line, attitude_.axes(line.emitted, line.target)};
+  }
+  const Companion& companion = companions_[body - 1];
+  const SightLine line = sight_line(camera_, companion.place, middle, spec_.light_path);
+  return {line, companion.axes(line.emitted)};
+}
+
 void SnapshotBuilder::add_companions(const SightLine& line, const BodyAxes& axes,
                                      const Position<J2000>& sun, const Shot& shot,
                                      Snapshot& out) const noexcept {
-  const SimTime middle = shot.shutter_open + shot.exposure / 2;
-  for (const Companion& companion : companions_) {
+  for (std::size_t i = 0; i < companions_.size(); ++i) {
+    const Companion& companion = companions_[i];
     CompanionView& view = out.companion[out.companions++];
-    const SightLine own = sight_line(camera_, companion.place,
-                                     spec_.epoch + middle.time_since_epoch(), spec_.light_path);
-    const BodyAxes own_axes = companion.axes(own.emitted);
-    see(companion.place, own, own_axes, shot, view);
-    light_up(own, own_axes, sun, view);
+    const Placed own = place(i + 1, shot);
+    see(companion.place, own.line, own.axes, shot, view);
+    light_up(own.line, own.axes, sun, view);
     view.centre = axes * Position<J2000>{companion.place.at(line.emitted).position.m -
                                          line.target.position.m};
-    view.from_target = own_axes * axes.inverse();
+    view.from_target = own.axes * axes.inverse();
+  }
+}
+
+Eigen::Vector3d SnapshotBuilder::toward_followed(const PartSpec& part, const Placed& owner,
+                                                 const Snapshot& seen) noexcept {
+  const BodyView& body =
+      part.owner == 0 ? seen : static_cast<const BodyView&>(seen.companion[part.owner - 1]);
+  switch (part.follows) {
+    case PartFollows::kSun:
+      return body.sun.toward.unit;
+    case PartFollows::kEarth:
+      return (owner.axes * Position<J2000>{-owner.line.target.position.m}).m - part.hinge_m;
+    case PartFollows::kCamera:
+      return body.camera.m - part.hinge_m;
+    case PartFollows::kBody: {
+      const auto centre = [&](std::size_t i) -> Eigen::Vector3d {
+        return i == 0 ? Eigen::Vector3d::Zero() : seen.companion[i - 1].centre.m;
+      };
+      const Eigen::Vector3d way = centre(part.followed) - centre(part.owner);
+      if (part.owner == 0) return way - part.hinge_m;
+      return seen.companion[part.owner - 1].from_target.matrix * way - part.hinge_m;
+    }
+    case PartFollows::kNothing:
+      break;
+  }
+  return Eigen::Vector3d::Zero();
+}
+
+void SnapshotBuilder::add_parts(const Position<J2000>& sun, const Shot& shot,
+                                Snapshot& out) const noexcept {
+  const Duration middle = (shot.shutter_open + shot.exposure / 2).time_since_epoch();
+  for (const ArticulatedPart& part : parts_) {
+    const PartSpec& spec = part.spec();
+    const Placed owner = place(spec.owner, shot);
+    const PartPose pose = part.pose(toward_followed(spec, owner, out), middle);
+    const Rotation<BodyFrame, BodyFrame> turn{pose.from_owner};
+    PartView& view = out.part[out.parts++];
+    const Rotation<BodyFrame, BodyFrame> owner_from_target =
+        spec.owner == 0 ? Rotation<BodyFrame, BodyFrame>{Eigen::Matrix3d::Identity()}
+                        : out.companion[spec.owner - 1].from_target;
+    const BodyView& body =
+        spec.owner == 0 ? out : static_cast<const BodyView&>(out.companion[spec.owner - 1]);
+    static_cast<BodyView&>(view) = body;
+    view.camera = turn * Position<BodyFrame>{body.camera.m - spec.hinge_m};
+    view.body_from_camera = turn * body.body_from_camera;
+    light_up(owner.line, turn * owner.axes, sun, view);
+    view.centre = owner_from_target.inverse() * Position<BodyFrame>{spec.hinge_m};
+    if (spec.owner > 0) view.centre.m += out.companion[spec.owner - 1].centre.m;
+    view.from_target = turn * owner_from_target;
+    view.owner = spec.owner;
+    view.angle_rad = pose.angle_rad;
+    view.second_angle_rad = pose.second_angle_rad;
+    view.at_limit = pose.at_limit;
   }
 }
 
 Snapshot SnapshotBuilder::build(const Shot& shot) const noexcept {
   const SimTime middle = shot.shutter_open + shot.exposure / 2;
-  const SightLine line =
-      sight_line(camera_, target_, spec_.epoch + middle.time_since_epoch(), spec_.light_path);
+  const auto [line, axes] = place(0, shot);
   const Position<J2000> sun = spec_.light_path == LightPath::kApparent
                                   ? apparent_sun_position(spec_.sun.model, line.emitted)
                                   : sun_position(spec_.sun.model, line.emitted);
-  const BodyAxes axes = attitude_.axes(line.emitted, line.target);
 
   Snapshot out;
   out.sequence = shot.sequence;
@@ -191,6 +269,7 @@ Snapshot SnapshotBuilder::build(const Shot& shot) const noexcept {
   out.attitude_is_fallback = attitude_.is_fallback(line.target);
   out.earthshine_rung = light_up(line, axes, sun, out);
   add_companions(line, axes, sun, shot, out);
+  add_parts(sun, shot, out);
   return out;
 }
 

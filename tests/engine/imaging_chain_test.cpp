@@ -48,7 +48,8 @@ class Rig {
       places_.push_back(std::make_unique<HeldOffset>(flyby.target, offset));
       moving.push_back({*places_.back(), flyby.target, {}});
     }
-    auto renderer = make_renderer(render, target, pool_, {companions.size(), target});
+    auto renderer =
+        make_renderer(render, target, pool_, {.companions = {companions.size(), target}});
     chain_ = std::make_unique<ImagingChain>(
         SnapshotBuilder(scene, flyby.camera, flyby.target, std::move(moving)), std::move(renderer),
         std::move(optics), Detector(detector, pool_), detector, scene.camera);

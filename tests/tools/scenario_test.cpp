@@ -540,7 +540,7 @@ TEST(Scenario, CompanionsWantTheRendererThatKnowsThem) {
   const auto said = complaint([&] { load_text(with_line(text, line, "method = \"lattice\"")); });
   ASSERT_TRUE(said.has_value());
   EXPECT_EQ(*said, "x.toml:" + std::to_string(line) +
-                       ": render.method must be \"paths\" where there are companions");
+                       ": render.method must be \"paths\" where there are companions or parts");
 }
 
 TEST(Scenario, ASlowVibrationIsAPathAndAFastOneAnOtf) {

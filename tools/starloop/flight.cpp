@@ -59,6 +59,7 @@ Flight::Result Flight::fly(const std::filesystem::path& folder, const DeviceMann
                        .width_px = spec.width_px,
                        .height_px = spec.height_px,
                        .companions = companion_names(scenario),
+                       .parts = part_names(scenario),
                        .when_busy = spec.when_busy});
   hil::ClosedLoopPointing pointing = make_pointing(scenario, rig_, spec.start);
   pacing_.start();

@@ -76,6 +76,14 @@ void tell(const std::string& fits, const std::string& png, const Scenario& scena
                 100.0 * c.visible_fraction,
                 c.sun_irradiance_w_m2 > 0.0 ? "" : ", in the Earth's shadow");
   }
+  const std::vector<std::string> parts = part_names(scenario);
+  for (std::size_t i = 0; i < t.parts; ++i) {
+    const engine::PartTruth& part = t.part[i];
+    std::printf("%s: turned by %.2f deg", parts[i].c_str(), part.angle_rad / engine::kDegree);
+    if (scenario.parts[i].second_axis)
+      std::printf(" and %.2f deg", part.second_angle_rad / engine::kDegree);
+    std::printf("%s\n", part.at_limit ? ", as far as its range lets it" : "");
+  }
   const engine::NoiseReached& noise = report.render.rho_mc;
   if (std::isfinite(noise.rms))
     std::printf("rendering noise %.3f of the sensor's over %d lit pixels, at worst %.2f\n",

@@ -2,15 +2,14 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <map>
 #include <thread>
+#include <utility>
 
 #include "engine/core/constants.h"
 #include "engine/render/mesh_levels.h"
-#include "engine/render/traced_target.h"
-#include "engine/scene/telescope.h"
 #include "hil/steady_clock.h"
 #include "tools/starloop/pattern.h"
+#include "tools/starloop/scene_bodies.h"
 
 namespace starloop {
 namespace {
@@ -18,36 +17,6 @@ namespace {
 // A wing of light is followed to where it is this share of the noise of a dark pixel: the default
 // profile's limit for all model errors together.
 constexpr double kUnseenShareOfNoise = 0.3;
-
-engine::Mesh load_mesh(const std::string& name) {
-  if (name == "telescope") return engine::telescope_mesh();
-  engine::MeshReport report;
-  engine::Mesh mesh = engine::load_obj(name, report);
-  if (report.left_out() > 0)
-    std::fprintf(stderr, "%s: %zu faces left out: %zu not finite, %zu without area\n", name.c_str(),
-                 report.left_out(), report.not_finite, report.zero_area);
-  return mesh;
-}
-
-/// The target's first. Bodies of one mesh share it.
-std::vector<std::shared_ptr<engine::TracedTarget>> traced_bodies(const Scenario& scenario) {
-  std::map<std::string, std::shared_ptr<engine::TracedTarget>> by_mesh;
-  std::vector<std::shared_ptr<engine::TracedTarget>> bodies;
-  const auto add = [&](const std::string& mesh, const std::string& where) {
-    std::shared_ptr<engine::TracedTarget>& shape = by_mesh[mesh];
-    try {
-      if (shape == nullptr)
-        shape = std::make_shared<engine::TracedTarget>(load_mesh(mesh), scenario.materials);
-    } catch (const engine::ConfigError& e) {
-      throw engine::ConfigError(where + ": " + e.what());
-    }
-    bodies.push_back(shape);
-  };
-  add(scenario.mesh, scenario.mesh_where);
-  for (const engine::CompanionSpec& companion : scenario.companions)
-    add(companion.mesh, companion.mesh_where);
-  return bodies;
-}
 
 std::string text_of(const engine::StarCatalogue& stars, const engine::CameraGeometry& camera) {
   char text[240];
@@ -124,10 +93,19 @@ Rig::Stages Rig::make_stages(const Scenario& scenario) {
   render.clock = &hil::SteadyClock::stopwatch;
   engine::SceneSpec scene = scenario.scene;
   scene.earthshine_sensor = earthshine_sensor(render.noise, scenario.materials);
-  const auto bodies = traced_bodies(scenario);
-  for (const auto& body : bodies) triangles_ += body->mesh.triangles.size();
-  if (render.mesh_level == engine::MeshLevelChoice::kAuto && bodies.size() == 1)
-    engine::add_mesh_levels(*bodies.front(), scenario.materials, render);
+  const std::vector<engine::Companion> companions = move_companions(scenario);
+  const auto builder_with = [&](std::vector<engine::ArticulatedPart> parts) {
+    return engine::SnapshotBuilder(scene, *camera_, *target_, companions, std::move(parts));
+  };
+  std::vector<engine::ArticulatedPart> parts(scenario.parts.begin(), scenario.parts.end());
+  std::optional<engine::Snapshot> frozen;
+  if (scenario.parts_frozen_at)
+    frozen = builder_with(std::exchange(parts, {}))
+                 .build(predicted_shot(*scenario.parts_frozen_at, scenario.run.exposure));
+  const SceneBodies bodies = make_bodies(scenario, frozen ? &*frozen : nullptr);
+  triangles_ = bodies.triangles();
+  if (render.mesh_level == engine::MeshLevelChoice::kAuto && bodies.others.empty())
+    engine::add_mesh_levels(*bodies.target, scenario.materials, render);
   std::unique_ptr<engine::Starlight> stars;
   if (scenario.stars.source != engine::StarSpec::Source::kNone) {
     const engine::StarCatalogue catalogue =
@@ -138,22 +116,39 @@ Rig::Stages Rig::make_stages(const Scenario& scenario) {
                           engine::StarLight(detector.mean_wavelength_m)),
         optics.splat(), detector);
   }
-  return {engine::SnapshotBuilder(scene, *camera_, *target_, move_companions(scenario)),
-          engine::make_renderer(render, bodies.front(), pool_, {bodies.begin() + 1, bodies.end()}),
-          std::move(optics), std::move(stars)};
+  return {builder_with(std::move(parts)),
+          engine::make_renderer(render, bodies.target, pool_, bodies.others), std::move(optics),
+          std::move(stars)};
 }
 
 std::vector<engine::Companion> Rig::move_companions(const Scenario& scenario) {
-  std::vector<engine::Companion> moving;
-  for (const engine::CompanionSpec& spec : scenario.companions) {
-    if (spec.orbit) {
-      companions_.push_back(propagator_of(scenario, *spec.orbit));
-    } else {
-      companions_.push_back(std::make_unique<engine::HeldOffset>(*target_, spec.offset));
+  const std::vector<engine::CompanionSpec>& specs = scenario.companions;
+  const std::size_t first = companions_.size();
+  companions_.resize(first + specs.size());
+  // Those that are held come after what they are held to.
+  const auto make = [&](const auto& self, std::size_t i) -> const engine::Propagator& {
+    std::unique_ptr<const engine::Propagator>& place = companions_[first + i];
+    if (place == nullptr && specs[i].orbit)
+      place = propagator_of(scenario, *specs[i].orbit);
+    else if (place == nullptr && specs[i].beside == 0)
+      place = std::make_unique<engine::HeldOffset>(*target_, specs[i].offset);
+    else if (place == nullptr)
+      place =
+          std::make_unique<engine::HeldOffset>(self(self, specs[i].beside - 1), specs[i].offset);
+    return *place;
+  };
+  const auto upright_of = [&](std::size_t i) -> const engine::Propagator& {
+    while (!specs[i].orbit) {
+      if (specs[i].beside == 0) return *target_;
+      i = specs[i].beside - 1;
     }
-    const engine::Propagator& place = *companions_.back();
-    const engine::Propagator& upright = spec.orbit ? place : *target_;
-    moving.push_back({place, upright, engine::BodyAttitude(spec.attitude, epoch_)});
+    return *companions_[first + i];
+  };
+  for (std::size_t i = 0; i < specs.size(); ++i) make(make, i);
+  std::vector<engine::Companion> moving;
+  for (std::size_t i = 0; i < specs.size(); ++i) {
+    moving.push_back(
+        {*companions_[first + i], upright_of(i), engine::BodyAttitude(specs[i].attitude, epoch_)});
   }
   return moving;
 }

@@ -71,9 +71,13 @@ Duration read_deadline(const ConfigTable& table, const RunSpec& run, engine::Ren
   return deadline;
 }
 
+bool several_bodies(const Scenario& s) {
+  return !s.companions.empty() || (!s.parts.empty() && !s.parts_frozen_at);
+}
+
 // What the lattice does not know: other bodies, fine grids, and stopping half-way.
 bool wants_paths(const ConfigTable& render, const Scenario& s) {
-  return !s.companions.empty() || s.optics.oversampling > engine::RenderSpec::kMostOfLattice ||
+  return several_bodies(s) || s.optics.oversampling > engine::RenderSpec::kMostOfLattice ||
          (render.has("deadline_ms") && !render.is_text("deadline_ms"));
 }
 
@@ -189,16 +193,20 @@ Scenario read_scenario(const ConfigReader& config) {
   s.mesh = config.table("target").text_or("mesh", "telescope");
   s.mesh_where = config.table("target").where("mesh");
   s.companions = engine::read_companions(config);
+  s.parts = engine::read_parts(config, s.companions);
   s.materials = engine::read_materials(config);
   s.optics = engine::read_optics(config.table("optics"), s.scene.camera);
   s.optics.stars = s.stars.source != engine::StarSpec::Source::kNone;
   s.render = engine::read_render(config.table("render"));
+  if (config.table("render").has("parts_frozen_at_s"))
+    s.parts_frozen_at = engine::sim_time(
+        config.table("render").number("parts_frozen_at_s", engine::between(0.0, 1e9)));
   if (s.render.method_by_need && wants_paths(config.table("render"), s))
     s.render.method = engine::RenderMethod::kPaths;
   s.run.render_time = read_deadline(config.table("render"), s.run, s.render.method);
   s.render.camera = s.scene.camera;
-  if (!s.companions.empty() && s.render.method != engine::RenderMethod::kPaths)
-    config.table("render").fail("method", "must be \"paths\" where there are companions");
+  if (several_bodies(s) && s.render.method != engine::RenderMethod::kPaths)
+    config.table("render").fail("method", "must be \"paths\" where there are companions or parts");
   if (s.optics.oversampling > engine::RenderSpec::kMostOfLattice &&
       s.render.method != engine::RenderMethod::kPaths)
     config.table("render").fail("method", "must be \"paths\" where the optics want " +
@@ -232,6 +240,7 @@ Scenario read_scenario(const ConfigReader& config) {
   s.tracker = read_tracker(config.table("tracker"), s.scene.camera);
   s.tracker.black_dn = s.detector.pedestal_dn;
   config.reject_unknown_keys();
+  if (s.parts_frozen_at) want_frames(s, *s.parts_frozen_at, *s.parts_frozen_at);
   return s;
 }
 
@@ -248,6 +257,15 @@ engine::SensorMaps sensor_maps(const Scenario& scenario) {
 std::vector<std::string> companion_names(const Scenario& scenario) {
   std::vector<std::string> names;
   for (const engine::CompanionSpec& spec : scenario.companions) names.push_back(spec.name);
+  return names;
+}
+
+std::vector<std::string> part_names(const Scenario& scenario) {
+  std::vector<std::string> names;
+  for (const engine::PartSpec& part : scenario.parts) {
+    names.push_back(part.owner == 0 ? part.name
+                                    : scenario.companions[part.owner - 1].name + "." + part.name);
+  }
   return names;
 }
 

@@ -73,6 +73,8 @@ struct Scenario {
   std::string mesh;
   std::string mesh_where;  ///< the place in the scenario that names it
   std::vector<engine::CompanionSpec> companions;
+  std::vector<engine::PartSpec> parts;
+  std::optional<engine::SimTime> parts_frozen_at;  ///< they stay as they stand then
   std::vector<engine::Material> materials;
   engine::RenderSpec render;
   engine::OpticsSpec optics;
@@ -118,6 +120,8 @@ struct ScenarioSource {
 [[nodiscard]] Scenario read_scenario(const engine::ConfigReader& config);
 /// In the order that frames have them in.
 [[nodiscard]] std::vector<std::string> companion_names(const Scenario& scenario);
+/// The same of parts: the target's by their own name, a companion's as <companion>.<part>.
+[[nodiscard]] std::vector<std::string> part_names(const Scenario& scenario);
 
 /// Of what the camera reads out. Throws engine::ConfigError.
 [[nodiscard]] engine::SensorMaps sensor_maps(const Scenario& scenario);

@@ -63,6 +63,18 @@ Json companions_of(const engine::FrameTruth& truth, const std::vector<std::strin
   return all;
 }
 
+/// By name.
+Json parts_of(const engine::FrameTruth& truth, const std::vector<std::string>& names) {
+  Json all = Json::object();
+  for (std::size_t i = 0; i < std::min(truth.parts, names.size()); ++i) {
+    const engine::PartTruth& part = truth.part[i];
+    all[names[i]] = {{"angle_rad", part.angle_rad},
+                     {"second_angle_rad", part.second_angle_rad},
+                     {"at_limit", part.at_limit}};
+  }
+  return all;
+}
+
 Json truth_of(const hil::FrameRecord& record) {
   const engine::FrameTruth& t = record.report.truth;
   const hil::MeasuredAttitude& m = record.measured;
@@ -232,6 +244,7 @@ void TruthRecorder::write_line(const hil::FrameRecord& record, const TruthMask* 
   Json line = truth_of(record);
   if (!spec_.companions.empty())
     line["companions"] = companions_of(record.report.truth, spec_.companions);
+  if (!spec_.parts.empty()) line["parts"] = parts_of(record.report.truth, spec_.parts);
   line["mask"] = mask != nullptr ? runs_of(*mask) : Json(nullptr);
   file_ << line.dump() << '\n';
   ++lines_;

@@ -41,6 +41,7 @@ class TruthRecorder final : public hil::FrameSink {
     int width_px = 0;
     int height_px = 0;
     std::vector<std::string> companions{};  ///< their names
+    std::vector<std::string> parts{};       ///< theirs
     hil::WhenBusy when_busy = hil::WhenBusy::kDropFrame;
   };
   /// Throws std::runtime_error when truth.jsonl cannot be made.

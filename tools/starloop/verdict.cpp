@@ -67,6 +67,7 @@ std::vector<std::string> left_out(const Scenario& s) {
   else if (hard)
     list.emplace_back("the Sun's disc in shadows");
   if (!s.companions.empty()) list.emplace_back("companions' smear: the frame has the target's");
+  if (!s.parts.empty()) list.emplace_back("that parts turn while the shutter is open");
   return list;
 }
 

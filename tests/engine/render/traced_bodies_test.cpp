@@ -80,7 +80,7 @@ struct Rendered {
 Rendered render(const RenderSpec& spec, const Bodies& bodies, const Snapshot& snapshot,
                 int threads = 1) {
   WorkerPool pool(threads);
-  PathTracer tracer(spec, bodies.front(), pool, {bodies.begin() + 1, bodies.end()});
+  PathTracer tracer(spec, bodies.front(), pool, {{bodies.begin() + 1, bodies.end()}, {}});
   Rendered out;
   out.report = tracer.render(snapshot, {}, out.light);
   return out;
@@ -315,6 +315,105 @@ TEST(TracedBodies, TheTargetsPartIsWhatItSendsPastTheOthers) {
   EXPECT_TRUE(std::ranges::equal(both.light.targets_grid.pixels(), alone.light.grid.pixels()));
   EXPECT_TRUE(std::ranges::equal(both.light.targets_cover.pixels(), alone.light.cover.pixels()));
   EXPECT_NEAR(both.sum() / alone.sum(), 1.0 + 0.2 / 0.6, 0.01);
+}
+
+/// A floor, a wing on a hinge at some angle over it, and a companion before both.
+struct WithAWing {
+  WithAWing() {
+    add_plate(floor, "white", {-3, -3, 0}, {6, 0, 0}, {0, 6, 0});
+    add_plate(wing, "grey", {0, -2, 0}, {4, 0, 0}, {0, 4, 0});
+    add_plate(block, "white", {-1, -1, 0}, {2, 0, 0}, {0, 2, 0});
+    turn = Eigen::AngleAxisd(0.7, Vector3d::UnitY()).toRotationMatrix();
+    hinge = {-2.0, 0.3, 2.5};
+    snapshot = look_at_origin({30e3, 10e3, 90e3}, {0, 1, 0});
+    snapshot.sun = {direction_of<BodyFrame>(Vector3d(-0.5, 0.2, 1)), kSun_w_m2};
+  }
+  /// Floor and wing in one.
+  [[nodiscard]] Mesh both() const {
+    Mesh mesh = floor;
+    const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+    for (const Eigen::Vector3f& v : wing.vertices)
+      mesh.vertices.push_back((turn.transpose() * v.cast<double>() + hinge).cast<float>());
+    const std::uint32_t grey = mesh.material("grey");
+    for (const Mesh::Triangle& t : wing.triangles)
+      mesh.triangles.push_back(
+          {{t.corner[0] + first, t.corner[1] + first, t.corner[2] + first}, grey});
+    return mesh;
+  }
+  static void add_wing(Snapshot& s, const Vector3d& hinge, const Matrix3d& turn) {
+    Snapshot alone = s;
+    alone.companions = 0;
+    static_cast<CompanionView&>(s.part[s.parts++]) = add_companion(alone, hinge, turn);
+  }
+  Mesh floor, wing, block;
+  Matrix3d turn;
+  Vector3d hinge;
+  Snapshot snapshot;
+};
+
+TEST(TracedBodies, ATargetWithAPartIsTheOneMeshOfBoth) {
+  WithAWing s;
+  const Vector3d before(1.5, 1.0, 6.0);  // hides some of each
+  Snapshot whole = s.snapshot;
+  add_companion(whole, before);
+  Snapshot in_parts = whole;
+  WithAWing::add_wing(in_parts, s.hinge, s.turn);
+  const auto draw = [](const Bodies& bodies, const OtherBodies& others, const Snapshot& snapshot) {
+    WorkerPool pool(1);
+    PathTracer tracer(spec_of(96), bodies.front(), pool, others);
+    Rendered out;
+    out.report = tracer.render(snapshot, {}, out.light);
+    return out;
+  };
+  const auto block = body(s.block);
+  const Rendered one = draw({body(s.both())}, {{block}, {}}, whole);
+  const Rendered two = draw({body(s.floor)}, {{block}, {{body(s.wing), 0}}}, in_parts);
+  const auto alike = [](const RadianceImage& a, const RadianceImage& b) {
+    ASSERT_EQ(a.width(), b.width());
+    ASSERT_EQ(a.height(), b.height());
+    std::size_t other = 0;
+    for (std::size_t i = 0; i < a.pixels().size(); ++i)
+      other += std::abs(a.pixels()[i] - b.pixels()[i]) > 1e-4F * a.pixels()[i] ? 1U : 0U;
+    EXPECT_LE(other, a.pixels().size() / 500);
+  };
+  alike(one.light.grid, two.light.grid);
+  // The wing's light counts as the target's, what the companion hides of it does not.
+  ASSERT_TRUE(two.light.companions_in_sight);
+  alike(one.light.targets_grid, two.light.targets_grid);
+  EXPECT_NEAR(two.report.visible_fraction, one.report.visible_fraction, 1e-9);
+  EXPECT_GT(two.sum(), 0.0);
+}
+
+TEST(TracedBodies, ACompanionsPartIsNotTheTargets) {
+  WithAWing s;
+  Snapshot apart = s.snapshot;
+  const Vector3d aside(9, 0, 0);
+  add_companion(apart, aside);
+  WithAWing::add_wing(apart, aside + s.hinge, s.turn);
+  apart.part[0].owner = 1;
+  WorkerPool pool(1);
+  const auto floor = body(s.floor);
+  PathTracer tracer(spec_of(160), floor, pool, {{body(s.block)}, {{body(s.wing), 1}}});
+  Rendered with;
+  with.report = tracer.render(apart, {}, with.light);
+  const Rendered alone = render(spec_of(160), {floor}, s.snapshot);
+  EXPECT_TRUE(with.light.companions_in_sight);
+  EXPECT_TRUE(std::ranges::equal(with.light.targets_grid.pixels(), alone.light.grid.pixels()));
+  // Of both together, where the block alone would be wholly in the frame.
+  EXPECT_NEAR(with.report.visible_fraction_of_companion[0], 1.0, 1e-9);
+  EXPECT_GT(with.sum(), 1.05 * alone.sum());
+}
+
+TEST(TracedBodies, TheTargetsOwnPartsAreNoCompanions) {
+  WithAWing s;
+  Snapshot in_parts = s.snapshot;
+  WithAWing::add_wing(in_parts, s.hinge, s.turn);
+  WorkerPool pool(1);
+  PathTracer tracer(spec_of(64), body(s.floor), pool, {{}, {{body(s.wing), 0}}});
+  Rendered out;
+  out.report = tracer.render(in_parts, {}, out.light);
+  EXPECT_FALSE(out.light.companions_in_sight);
+  EXPECT_TRUE(out.light.targets_region.empty());
 }
 
 TEST(TracedBodies, NothingIsTracedBetweenThem) {

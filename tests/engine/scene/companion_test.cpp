@@ -52,6 +52,29 @@ TEST(Companion, IsReadWithAnOrbitOrAnOffset) {
   EXPECT_TRUE(companions_of("").empty());
 }
 
+TEST(Companion, MayBeHeldBesideAnother) {
+  const auto companions =
+      companions_of("[companions.a]\nbeside = \"b\"\nalong_m = 5\n[companions.b]\n" + kOrbit +
+                    "[companions.c]\nbeside = \"a\"\nalong_m = 5\n[companions.d]\nalong_m = 1\n");
+  ASSERT_EQ(companions.size(), 4U);
+  EXPECT_EQ(companions[0].beside, 2U);
+  EXPECT_EQ(companions[2].beside, 1U);
+  EXPECT_EQ(companions[3].beside, 0U);
+  EXPECT_EQ(complaint_of("[companions.a]\nbeside = \"z\"\nalong_m = 5\n"),
+            "x.toml:2: companions.a.beside must be \"target\" or the name of a companion, got "
+            "\"z\"");
+  EXPECT_EQ(complaint_of("[companions.b]\nbeside = \"target\"\n" + kOrbit),
+            "x.toml:3: companions.b.orbit and beside exclude each other");
+  // In a ring, one that leads into it, and beside itself.
+  const std::string ring =
+      "[companions.a]\nbeside = \"b\"\nalong_m = 5\n[companions.b]\nbeside = \"a\"\nalong_m = 5\n";
+  for (const std::string& text : {ring, "[companions.0]\nbeside = \"a\"\nalong_m = 5\n" + ring,
+                                  std::string("[companions.a]\nbeside = \"a\"\nalong_m = 5\n")})
+    EXPECT_NE(complaint_of(text).find(
+                  ".beside leads back to where it began: nothing of this chain has an orbit"),
+              std::string::npos);
+}
+
 TEST(Companion, WhatIsWrongIsToldWithItsLine) {
   EXPECT_EQ(complaint_of("\n[companions.a]\nmesh = \"telescope\"\n"),
             "x.toml:2: companions.a must have a table orbit, or radial_m, along_m or cross_m: "
@@ -68,9 +91,10 @@ TEST(Companion, WhatIsWrongIsToldWithItsLine) {
   orbit.replace(orbit.find("0.001"), 5, "1.000");
   EXPECT_EQ(complaint_of(orbit).substr(0, 43), "x.toml:3: companions.b.orbit.eccentricity m");
   std::string many;
-  for (int i = 0; i < 9; ++i)
+  for (int i = 10; i < 43; ++i)
     many += "[companions.c" + std::to_string(i) + "]\nalong_m = " + std::to_string(i) + "\n";
-  EXPECT_EQ(complaint_of(many), "x.toml:17: companions.c8 is one too many: there may be 8, got 9");
+  EXPECT_EQ(complaint_of(many),
+            "x.toml:65: companions.c42 is one too many: there may be 32, got 33");
 }
 
 Shot shot_at(const Flyby& flyby, double t_s) {
