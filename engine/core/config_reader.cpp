@@ -78,8 +78,11 @@ struct ConfigReader::Document {
   }
 
   [[nodiscard]] std::string origin(const std::string& path) const {
+    return origin_of(root.at_path(path).node(), path);
+  }
+  /// For names that a path cannot say: they may hold dots.
+  [[nodiscard]] std::string origin_of(const toml::node* node, const std::string& path) const {
     if (const auto it = overridden.find(path); it != overridden.end()) return it->second;
-    const toml::node* node = root.at_path(path).node();
     if (node == nullptr || node->source().begin.line == 0) return name;
     return name + ":" + std::to_string(node->source().begin.line);
   }
@@ -250,6 +253,20 @@ std::vector<std::string> ConfigTable::texts(const std::string& key) const {
   for (const toml::node& node : *list) {
     if (!node.is_string()) fail(key, "must be a list of texts, got in it " + kind_text(node));
     all.push_back(node.as_string()->get());
+  }
+  return all;
+}
+
+std::vector<ConfigTable::NamedText> ConfigTable::named_texts() const {
+  std::vector<NamedText> all;
+  const auto* table = document_->root.at_path(name_).as_table();
+  if (table == nullptr) return all;
+  for (const auto& [name, node] : *table) {
+    const std::string its_path = path(std::string(name.str()));
+    document_->asked.insert(its_path);
+    const std::string its_where = document_->origin_of(&node, its_path) + ": " + its_path;
+    if (!node.is_string()) throw ConfigError(its_where + " must be text, got " + kind_text(node));
+    all.push_back({std::string(name.str()), node.as_string()->get(), its_where});
   }
   return all;
 }

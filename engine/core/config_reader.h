@@ -100,6 +100,13 @@ class ConfigTable {
                                             const Range& range) const;
   /// A text, or a list of texts; empty when it is not there.
   [[nodiscard]] std::vector<std::string> texts(const std::string& key) const;
+  /// What stands in a table whose keys are the user's own names, in alphabetical order.
+  struct NamedText {
+    std::string name;
+    std::string text;
+    std::string where;  ///< "file:line: table.name"
+  };
+  [[nodiscard]] std::vector<NamedText> named_texts() const;
   [[nodiscard]] bool flag_or(const std::string& key, bool fallback) const;  ///< true or false
   [[nodiscard]] bool is_text(const std::string& key) const;
 

@@ -30,8 +30,7 @@ CompanionSpec read_companion(const ConfigReader& config, const std::string& name
   const ConfigTable table = config.table(path);
   CompanionSpec spec;
   spec.name = name;
-  spec.mesh = table.text_or("mesh", spec.mesh);
-  spec.mesh_where = table.where("mesh");
+  spec.mesh = read_mesh_spec(config, path);
   spec.attitude = read_attitude(table);
   const bool held = table.has("radial_m") || table.has("along_m") || table.has("cross_m");
   if (table.has("orbit")) {

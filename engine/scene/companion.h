@@ -8,6 +8,7 @@
 #include "engine/orbit/body_attitude.h"
 #include "engine/orbit/held_offset.h"
 #include "engine/orbit/orbit_spec.h"
+#include "engine/scene/mesh_spec.h"
 #include "engine/scene/snapshot.h"
 
 namespace engine {
@@ -15,8 +16,7 @@ namespace engine {
 /// A body besides the target: companions.<name> of a scenario.
 struct CompanionSpec {
   std::string name;
-  std::string mesh = "telescope";
-  std::string mesh_where;          ///< the place in the scenario that names it
+  MeshSpec mesh;
   std::optional<OrbitSpec> orbit;  ///< none: it is held beside another body
   std::size_t beside = 0;          ///< 0: the target, n: companion n - 1
   OrbitalOffset offset;            ///< where it has no orbit of its own

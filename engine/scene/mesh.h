@@ -34,15 +34,4 @@ using CornerNormals = std::array<Eigen::Vector3f, 3>;
 /// normal at a corner is their mean, each weighted by its angle there.
 [[nodiscard]] std::vector<CornerNormals> smooth_normals(const Mesh& mesh, double crease_rad);
 
-/// What was left out of a file so that the rest could be used.
-struct MeshReport {
-  std::size_t not_finite = 0;  ///< faces with a corner that is not a number
-  std::size_t zero_area = 0;
-  [[nodiscard]] std::size_t left_out() const noexcept { return not_finite + zero_area; }
-};
-
-/// Reads an OBJ file: triangles, quads and polygons, its materials by name only.
-/// Throws ConfigError: no file, nothing in it, an index outside the file, over 10 million corners.
-[[nodiscard]] Mesh load_obj(const std::string& path, MeshReport& report);
-
 }  // namespace engine

@@ -11,6 +11,7 @@
 
 #include "engine/render/far_light.h"
 #include "engine/render/traced_target.h"
+#include "engine/scene/mesh_spec.h"
 #include "engine/scene/telescope.h"
 #include "tests/support/scenes.h"
 #include "tests/support/temp_file.h"
@@ -107,7 +108,9 @@ TEST(FineMesh, ReadsBackAsItWasWritten) {
   ASSERT_TRUE(bench::write_obj(mesh, file.path()));
   EXPECT_FALSE(bench::write_obj(mesh, "/nowhere/" + file.path()));
   engine::MeshReport report;
-  const Mesh read = engine::load_obj(file.path(), report);
+  engine::MeshSpec spec;
+  spec.name = file.path();
+  const Mesh read = engine::load_mesh(spec, report).mesh;
   EXPECT_EQ(report.left_out(), 0U);
   EXPECT_EQ(read.triangles.size(), mesh.triangles.size());
   EXPECT_DOUBLE_EQ(read.bounding_radius_m(), mesh.bounding_radius_m());

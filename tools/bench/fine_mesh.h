@@ -17,7 +17,7 @@ namespace bench {
 /// makes the same mesh.
 void wrinkle(engine::Mesh& mesh, double rms_m, std::uint64_t seed);
 
-/// As engine::load_obj reads it: PATH, and beside it PATH.mtl with the materials' names. False: it
+/// As engine::load_mesh reads it: PATH, and beside it PATH.mtl with the materials' names. False: it
 /// cannot be written.
 [[nodiscard]] bool write_obj(const engine::Mesh& mesh, const std::string& path);
 

@@ -15,6 +15,7 @@
 
 #include "engine/core/constants.h"
 #include "engine/render/path_tracer.h"
+#include "engine/scene/mesh_spec.h"
 #include "engine/scene/telescope.h"
 #include "hil/steady_clock.h"
 #include "tools/bench/bare_embree.h"
@@ -250,7 +251,9 @@ int main(int argc, char** argv) {
     const double pixels = argc > 2 ? std::atof(argv[2]) : 100.0;
     if (argc > 1) {
       MeshReport report;
-      const Mesh mesh = load_obj(argv[1], report);
+      MeshSpec spec;
+      spec.name = argv[1];
+      const Mesh mesh = load_mesh(spec, report).mesh;
       if (argc > 3) {
         render_only(mesh, lambert_for(mesh), pixels, std::atoi(argv[3]));
         return 0;

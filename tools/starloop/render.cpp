@@ -31,7 +31,7 @@ std::vector<engine::FitsCard> header_of(const Scenario& s, double time_s,
   const engine::NoiseReached& noise = r.render.rho_mc;
   return {
       {"ORIGIN", "Starloop", "program that made this frame"},
-      {"OBJECT", s.mesh, "target"},
+      {"OBJECT", s.mesh.name, "target"},
       {"SCENARIO", s.name, "scenario"},
       {"DATE-OBS", engine::utc_text(open), "shutter opens, UTC"},
       {"TIME", time_s, "[s] shutter opens, after the scenario's epoch"},

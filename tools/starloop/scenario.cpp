@@ -190,8 +190,7 @@ Scenario read_scenario(const ConfigReader& config) {
   s.search_span = from_seconds(
       visibility.number_or("span_days", 15.0, engine::between(0.001, 1000.0)) * 86400.0);
 
-  s.mesh = config.table("target").text_or("mesh", "telescope");
-  s.mesh_where = config.table("target").where("mesh");
+  s.mesh = engine::read_mesh_spec(config, "target");
   s.companions = engine::read_companions(config);
   s.parts = engine::read_parts(config, s.companions);
   s.materials = engine::read_materials(config);

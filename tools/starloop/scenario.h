@@ -70,8 +70,7 @@ struct Scenario {
   engine::Duration search_span{};
   engine::SimTime latest{};  ///< of all times, where frames after the search are wanted
   engine::SceneSpec scene;
-  std::string mesh;
-  std::string mesh_where;  ///< the place in the scenario that names it
+  engine::MeshSpec mesh;
   std::vector<engine::CompanionSpec> companions;
   std::vector<engine::PartSpec> parts;
   std::optional<engine::SimTime> parts_frozen_at;  ///< they stay as they stand then

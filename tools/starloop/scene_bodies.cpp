@@ -2,35 +2,34 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <deque>
 #include <map>
 #include <tuple>
 #include <utility>
 
 #include "engine/core/contract.h"
-#include "engine/scene/grouped_mesh.h"
-#include "engine/scene/telescope.h"
+#include "engine/scene/mesh_spec.h"
 
 namespace starloop {
 namespace {
 
 using engine::ConfigError;
 using engine::GroupedMesh;
+using engine::MeshSpec;
 using engine::PartSpec;
 using engine::TracedTarget;
 
-engine::Mesh load_mesh(const std::string& name) {
-  if (name == "telescope") return engine::telescope_mesh();
+/// Says what was left out, and what looks wrong.
+GroupedMesh load(const MeshSpec& spec, const std::vector<engine::Material>& materials) {
   engine::MeshReport report;
-  engine::Mesh mesh = engine::load_obj(name, report);
+  GroupedMesh grouped = engine::load_mesh(spec, report);
+  const char* name = spec.name.c_str();
   if (report.left_out() > 0)
-    std::fprintf(stderr, "%s: %zu faces left out: %zu not finite, %zu without area\n", name.c_str(),
-                 report.left_out(), report.not_finite, report.zero_area);
-  return mesh;
-}
-
-GroupedMesh load_grouped(const std::string& name) {
-  GroupedMesh grouped{load_mesh(name), {name}, {}};
-  grouped.group.resize(grouped.mesh.triangles.size());
+    std::fprintf(stderr, "%s: %zu of %zu faces left out; 'starloop mesh' says which and why\n",
+                 name, report.left_out(), report.faces);
+  for (const std::string& warning : report.warnings)
+    std::fprintf(stderr, "%s: %s\n", name, warning.c_str());
+  engine::give_materials(grouped.mesh, spec, materials);
   return grouped;
 }
 
@@ -48,55 +47,51 @@ class Workshop {
 
   /// What is left of a body without its parts.
   std::shared_ptr<TracedTarget> body(std::size_t owner) {
-    const auto [mesh, where] = mesh_of(owner);
-    const GroupedMesh& grouped = read(mesh, where);
-    std::vector<bool> rest(grouped.group_names.size(), true);
+    const File& file = read(owner);
+    std::vector<bool> rest(file.grouped.group_names.size(), true);
     for (const PartSpec& part : scenario_.parts) {
       if (part.owner != owner) continue;
-      const std::vector<bool> own = groups_of(part);
+      const std::vector<bool> own = groups_of(part, file);
       for (std::size_t i = 0; i < own.size(); ++i) {
         if (own[i] && !rest[i]) {
-          throw ConfigError(part.where + " has the group \"" + grouped.group_names[i] +
+          throw ConfigError(part.where + " has the group \"" + file.grouped.group_names[i] +
                             "\", which another part has, too");
         }
         rest[i] = rest[i] && !own[i];
       }
     }
-    return shape(mesh, where, rest, Eigen::Vector3d::Zero());
+    return shape(file, rest, Eigen::Vector3d::Zero());
   }
   /// With its hinge in the origin.
   std::shared_ptr<TracedTarget> part(const PartSpec& part) {
-    return shape(mesh_of(part.owner).first, part.where, groups_of(part), part.hinge_m);
+    const File& file = read(part.owner);
+    return shape(file, groups_of(part, file), part.hinge_m);
   }
 
  private:
-  using Key = std::tuple<std::string, std::vector<bool>, std::array<double, 3>>;
+  struct File {
+    std::size_t number = 0;
+    const MeshSpec& spec;
+    GroupedMesh grouped;
+  };
+  using Key = std::tuple<std::size_t, std::vector<bool>, std::array<double, 3>>;
 
-  /// And the place in the scenario that names it.
-  [[nodiscard]] std::pair<std::string, std::string> mesh_of(std::size_t owner) const {
-    if (owner == 0) return {scenario_.mesh, scenario_.mesh_where};
-    const engine::CompanionSpec& companion = scenario_.companions[owner - 1];
-    return {companion.mesh, companion.mesh_where};
+  const File& read(std::size_t owner) {
+    const MeshSpec& spec = owner == 0 ? scenario_.mesh : scenario_.companions[owner - 1].mesh;
+    const auto same =
+        std::ranges::find_if(files_, [&](const File& file) { return file.spec.same_body(spec); });
+    if (same != files_.end()) return *same;
+    files_.push_back({files_.size(), spec, load(spec, scenario_.materials)});
+    return files_.back();
   }
 
-  const GroupedMesh& read(const std::string& mesh, const std::string& where) {
-    const auto known = files_.find(mesh);
-    if (known != files_.end()) return known->second;
-    try {
-      return files_.emplace(mesh, load_grouped(mesh)).first->second;
-    } catch (const ConfigError& e) {
-      throw ConfigError(where + ": " + e.what());
-    }
-  }
-
-  std::vector<bool> groups_of(const PartSpec& part) {
-    const auto [mesh, where] = mesh_of(part.owner);
-    const std::vector<std::string>& names = read(mesh, where).group_names;
+  static std::vector<bool> groups_of(const PartSpec& part, const File& file) {
+    const std::vector<std::string>& names = file.grouped.group_names;
     std::vector<bool> groups(names.size(), false);
     for (const std::string& name : part.groups) {
       const auto it = std::ranges::find(names, name);
       if (it == names.end()) {
-        throw ConfigError(part.where + " names \"" + name + "\", the mesh " + mesh +
+        throw ConfigError(part.where + " names \"" + name + "\", the mesh " + file.spec.name +
                           " has the groups " + listed(names));
       }
       groups[static_cast<std::size_t>(it - names.begin())] = true;
@@ -104,26 +99,22 @@ class Workshop {
     return groups;
   }
 
-  std::shared_ptr<TracedTarget> shape(const std::string& mesh, const std::string& where,
-                                      const std::vector<bool>& groups,
+  std::shared_ptr<TracedTarget> shape(const File& file, const std::vector<bool>& groups,
                                       const Eigen::Vector3d& origin_m) {
     std::shared_ptr<TracedTarget>& made =
-        shapes_[{mesh, groups, {origin_m.x(), origin_m.y(), origin_m.z()}}];
+        shapes_[{file.number, groups, {origin_m.x(), origin_m.y(), origin_m.z()}}];
     if (made != nullptr) return made;
-    engine::Mesh own = files_.at(mesh).part(groups);
-    if (own.triangles.empty())
-      throw ConfigError(where + ": the parts that turn leave nothing of the body itself");
-    for (Eigen::Vector3f& v : own.vertices) v = (v.cast<double>() - origin_m).cast<float>();
-    try {
-      made = std::make_shared<TracedTarget>(std::move(own), scenario_.materials);
-    } catch (const ConfigError& e) {
-      throw ConfigError(where + ": " + e.what());
+    engine::Mesh own = file.grouped.part(groups);
+    if (own.triangles.empty()) {
+      throw ConfigError(file.spec.where + ": the parts that turn leave nothing of the body itself");
     }
+    for (Eigen::Vector3f& v : own.vertices) v = (v.cast<double>() - origin_m).cast<float>();
+    made = std::make_shared<TracedTarget>(std::move(own), scenario_.materials);
     return made;
   }
 
   const Scenario& scenario_;
-  std::map<std::string, GroupedMesh> files_;
+  std::deque<File> files_;
   std::map<Key, std::shared_ptr<TracedTarget>> shapes_;
 };
 

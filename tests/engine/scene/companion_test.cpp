@@ -40,13 +40,13 @@ TEST(Companion, IsReadWithAnOrbitOrAnOffset) {
       "[companions.a]\nmesh = \"a.obj\"\nalong_m = -20.5\nyaw_deg = 90\n[companions.b]\n" + kOrbit);
   ASSERT_EQ(companions.size(), 2U);
   EXPECT_EQ(companions[0].name, "a");
-  EXPECT_EQ(companions[0].mesh, "a.obj");
-  EXPECT_EQ(companions[0].mesh_where, "x.toml:2: companions.a.mesh");
+  EXPECT_EQ(companions[0].mesh.name, "a.obj");
+  EXPECT_EQ(companions[0].mesh.where, "x.toml:2: companions.a.mesh");
   EXPECT_FALSE(companions[0].orbit.has_value());
   EXPECT_EQ(companions[0].offset.along_m, -20.5);
   EXPECT_EQ(companions[0].offset.radial_m, 0.0);
   EXPECT_DOUBLE_EQ(companions[0].attitude.offsets.yaw_rad, 0.5 * kPi);
-  EXPECT_EQ(companions[1].mesh, "telescope");
+  EXPECT_EQ(companions[1].mesh.name, "telescope");
   ASSERT_TRUE(companions[1].orbit.has_value());
   EXPECT_EQ(companions[1].orbit->elements.semi_major_axis_m, 7e6);
   EXPECT_TRUE(companions_of("").empty());
