@@ -8,19 +8,26 @@
 namespace engine {
 namespace {
 
-constexpr std::string_view kBlanks = " \t\v\f";
+constexpr bool is_blank(char c) noexcept { return c == ' ' || c == '\t' || c == '\v' || c == '\f'; }
+constexpr bool ends_line(char c) noexcept { return c == '\r' || c == '\n'; }
 
-std::string_view trimmed(std::string_view text) {
-  const std::size_t first = text.find_first_not_of(kBlanks);
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(kBlanks) - first + 1);
+/// Up to the first character that is such a one.
+template <class Is>
+std::size_t length_before(std::string_view text, const Is& is) noexcept {
+  return static_cast<std::size_t>(std::ranges::find_if(text, is) - text.begin());
+}
+
+std::string_view trimmed(std::string_view text) noexcept {
+  while (!text.empty() && is_blank(text.front())) text.remove_prefix(1);
+  while (!text.empty() && is_blank(text.back())) text.remove_suffix(1);
+  return text;
 }
 
 /// Cuts the first word off; empty when there is none, or a comment begins.
 std::string_view next_word(std::string_view& text) {
   text = trimmed(text);
   if (text.empty() || text.front() == '#') return {};
-  const std::size_t length = std::min(text.find_first_of(kBlanks), text.size());
+  const std::size_t length = length_before(text, is_blank);
   const std::string_view word = text.substr(0, length);
   text.remove_prefix(length);
   return word;
@@ -101,7 +108,7 @@ bool ObjLines::next_line() {
   joined_.clear();
   line_ = lines_taken_ + 1;
   while (!text_.empty()) {
-    const std::size_t length = std::min(text_.find_first_of("\r\n"), text_.size());
+    const std::size_t length = length_before(text_, ends_line);
     std::string_view part = text_.substr(0, length);
     text_.remove_prefix(length);
     if (!text_.empty()) text_.remove_prefix(text_.starts_with("\r\n") ? 2 : 1);
@@ -126,7 +133,7 @@ bool ObjLines::next_line() {
 bool ObjLines::take_vertex(std::string_view rest) {
   if (++vertices_ > static_cast<std::int64_t>(kMostVertices))
     fail(line_, "expected at most 10 million vertices, found one more");
-  statement_ = "v";
+  statement_.assign(1, 'v');
   is_number_ = true;
   const std::string_view all = rest;
   for (int i = 0; i < 3; ++i) {
@@ -137,7 +144,7 @@ bool ObjLines::take_vertex(std::string_view rest) {
     }
     statement_.append(" ").append(word);
   }
-  if (!is_number_) statement_ = "v 0 0 0";
+  if (!is_number_) statement_.assign(std::string_view("v 0 0 0"));
   return true;
 }
 
@@ -150,7 +157,9 @@ void ObjLines::check_index(std::string_view index) const {
   digits.remove_prefix(std::min(digits.find_first_not_of('0'), digits.size()));
   if (digits.empty()) expected("the index of a vertex, which count from 1", index);
   const bool relative = index.front() == '-';
-  const std::int64_t number = digits.size() > kMostDigits ? 0 : std::stoll(std::string(digits));
+  std::int64_t number = 0;
+  if (digits.size() <= kMostDigits)
+    for (const char c : digits) number = 10 * number + (c - '0');
   if (number == 0 || (relative && number > vertices_))
     expected("the index of one of the vertices, " + std::to_string(vertices_) + " up to here",
              index);
@@ -158,7 +167,7 @@ void ObjLines::check_index(std::string_view index) const {
 
 bool ObjLines::take_face(std::string_view rest) {
   ++report_.faces;
-  statement_ = "f";
+  statement_.assign(1, 'f');
   std::size_t corners = 0;
   for (std::string_view word = next_word(rest); !word.empty(); word = next_word(rest)) {
     if (++corners > kMostCornersOfAFace)

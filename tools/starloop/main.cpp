@@ -139,6 +139,19 @@ int run_command(int argc, char** argv) {
   mtf_app->add_option("--out", mtf.out, "CSV file; the plane's and the PNGs go beside it")
       ->capture_default_str();
 
+  starloop::MeshOptions mesh;
+  CLI::App* mesh_app = app.add_subcommand(
+      "mesh", "Tell what a mesh file is like, what a scenario would mend in it, and draw it");
+  mesh_app->add_option("mesh", mesh.file, "OBJ file, or a built-in mesh: telescope")->required();
+  mesh_app->add_option("--units", mesh.units, "of the file: m, cm, mm, km, in or ft")
+      ->check(CLI::IsMember({"m", "cm", "mm", "km", "in", "ft"}))
+      ->capture_default_str();
+  mesh_app->add_option("--axes", mesh.axes,
+                       "of the file that become x, y and z of the body: --axes=\"z -x -y\"");
+  mesh_app->add_flag("--json", mesh.as_json, "print an object");
+  mesh_app->add_option("-o,--out", mesh.out, "PNG of five views; \"\": none")
+      ->capture_default_str();
+
   std::string bench_folder = "characterize";
   CLI::App* bench_app = app.add_subcommand(
       "characterize",
@@ -181,6 +194,7 @@ int run_command(int argc, char** argv) {
   if (mtf_app->parsed()) return starloop::export_mtf(common, mtf);
   if (stages_app->parsed()) return starloop::render_stages(common, stages);
   if (bench_app->parsed()) return starloop::characterize_camera(common, bench_folder);
+  if (mesh_app->parsed()) return starloop::report_mesh(mesh);
   if (links_app->parsed()) return starloop::list_links();
   if (passes_app->parsed()) return starloop::list_passes(common, passes);
   return starloop::render_frames(common, render);

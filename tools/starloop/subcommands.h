@@ -31,6 +31,16 @@ struct RenderOptions {
 /// a picture of all of them besides.
 int render_frames(const CommonOptions& options, const RenderOptions& render);
 
+struct MeshOptions {
+  std::string file;         ///< or the name of a built-in mesh
+  std::string units = "m";  ///< of the file
+  std::string axes;         ///< empty: the body's
+  bool as_json = false;
+  std::string out = "mesh.png";  ///< empty: no picture
+};
+/// Prints what a mesh is like, what was mended and what is wrong with it, and draws it.
+int report_mesh(const MeshOptions& options);
+
 struct StagesOptions {
   double time_s = 0;  ///< shutter opens
   std::string out = "stages.png";
