@@ -23,7 +23,9 @@ enum class Stream : std::uint32_t {
   kCosmicRays = 10,
   kJitter = 20,
   kAttitude = 21,
-  kFaults = 22
+  kFaults = 22,
+  kMeshSeeds = 30,
+  kCrinkle = 31
 };
 
 /// Random numbers as a function of (seed, stream, frame, place): same bits whatever the threads.
