@@ -50,11 +50,19 @@ void NumberTable::fail(int line, const std::string& complaint) const {
 
 NumberTable read_number_table(const std::string& path, const std::string& columns,
                               std::size_t most_rows) {
+  return read_number_table(path, std::vector<std::string>{columns}, most_rows);
+}
+
+NumberTable read_number_table(const std::string& path, const std::vector<std::string>& forms,
+                              std::size_t most_rows) {
+  std::string wanted;
+  for (const std::string& columns : forms)
+    wanted += (wanted.empty() ? "\"" : " or \"") + columns + "\"";
   NumberTable table;
   table.path = path;
   std::ifstream file(path, std::ios::binary);
   if (!file) throw ConfigError(path + ": expected a table, found no file to read");
-  const auto count = static_cast<std::size_t>(std::count(columns.begin(), columns.end(), ',')) + 1;
+  std::size_t count = 0;
   bool named = false;
   std::string line;
   for (int number = 1; next_line(file, line); ++number) {
@@ -63,9 +71,12 @@ NumberTable read_number_table(const std::string& path, const std::string& column
     if (line.empty() || line[0] == '#') continue;
     if (!named) {
       std::erase(line, ' ');
-      if (line != columns)
+      const auto form = std::ranges::find(forms, line);
+      if (form == forms.end())
         table.fail(number,
-                   "must name the columns \"" + columns + "\", got \"" + line.substr(0, 60) + "\"");
+                   "must name the columns " + wanted + ", got \"" + line.substr(0, 60) + "\"");
+      table.form = static_cast<std::size_t>(form - forms.begin());
+      count = static_cast<std::size_t>(std::ranges::count(line, ',')) + 1;
       named = true;
       continue;
     }
@@ -77,7 +88,7 @@ NumberTable read_number_table(const std::string& path, const std::string& column
     table.rows.push_back(std::move(row));
   }
   if (file.bad()) throw ConfigError(path + ": expected a table, found one unreadable");
-  if (!named) table.fail(1, "must name the columns \"" + columns + "\", got nothing");
+  if (!named) table.fail(1, "must name the columns " + wanted + ", got nothing");
   return table;
 }
 

@@ -13,6 +13,7 @@ struct NumberTable {
     std::vector<double> values;
   };
   std::string path;
+  std::size_t form = 0;  ///< which of the columns' lists it has
   std::vector<Row> rows;
 
   /// Throws ConfigError: "path:line: complaint".
@@ -22,6 +23,10 @@ struct NumberTable {
 /// Throws ConfigError, with path and line, for other columns, a cell that is no finite
 /// number, or more than `most_rows`.
 [[nodiscard]] NumberTable read_number_table(const std::string& path, const std::string& columns,
+                                            std::size_t most_rows);
+/// The same for a file that may have any of these lists of columns.
+[[nodiscard]] NumberTable read_number_table(const std::string& path,
+                                            const std::vector<std::string>& forms,
                                             std::size_t most_rows);
 
 }  // namespace engine

@@ -88,6 +88,12 @@ void add_mesh_levels(TracedTarget& target, const std::vector<Material>& material
   const std::size_t triangles = target.mesh.triangles.size();
   const double light_e = kSunlight_w_m2 * brightest_of(target) * spec.noise.e_per_radiance;
   if (triangles < kFewTriangles || !(light_e > 0.0)) return;
+  // A measured lobe cannot be made as wide as the normals of what a facet stands for.
+  const auto is_measured = [&](const std::string& name) {
+    const auto it = std::ranges::find(materials, name, &Material::name);
+    return it != materials.end() && it->table != nullptr;
+  };
+  if (std::ranges::any_of(target.mesh.material_names, is_measured)) return;
   const double limit_px =
       kShareOfErrors * spec.profile.rho_total / error_sigmas(spec, 1.0, light_e);
   const MeshSimplifier simplifier(target.mesh, materials);

@@ -14,10 +14,6 @@ std::string material_missing(const std::string& name) {
          name;
 }
 
-bool alike(const Material& a, const Material& b) {
-  return a.parameters == b.parameters && a.variant == b.variant && a.wrinkle_rad == b.wrinkle_rad;
-}
-
 std::vector<Brdf> in_mesh_order(const Mesh& mesh, const std::vector<Material>& materials) {
   std::vector<Brdf> brdfs;
   std::vector<const Material*> made;
@@ -26,7 +22,7 @@ std::vector<Brdf> in_mesh_order(const Mesh& mesh, const std::vector<Material>& m
                                  [&](const Material& m) { return m.name == name; });
     if (it == materials.end()) throw ConfigError(material_missing(name));
     // Their tables are dear, and a simplified mesh has many alike.
-    const auto same = std::ranges::find_if(made, [&](const Material* m) { return alike(*m, *it); });
+    const auto same = std::ranges::find_if(made, [&](const Material* m) { return m->alike(*it); });
     brdfs.push_back(same == made.end() ? it->brdf()
                                        : brdfs[static_cast<std::size_t>(same - made.begin())]);
     made.push_back(&*it);

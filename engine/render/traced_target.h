@@ -5,6 +5,7 @@
 
 #include "engine/render/embree_scene.h"
 #include "engine/render/facets.h"
+#include "engine/scene/material.h"
 #include "engine/scene/mesh.h"
 
 namespace engine {

@@ -126,7 +126,7 @@ SimplifiedMesh MeshSimplifier::as_it_is() const {
 std::size_t MeshSimplifier::class_of(std::uint32_t material, double spread_rad) const noexcept {
   const Material& m = materials_[material];
   const double least_rad = std::max(kLeastSpread_rad, kMatters * m.wrinkle_rad);
-  if (!(m.parameters.kb > 0.0 && spread_rad >= least_rad)) return 0;
+  if (!(m.shines() && m.table == nullptr && spread_rad >= least_rad)) return 0;
   const auto spread_class = 1 + static_cast<std::size_t>(std::log2(spread_rad / kLeastSpread_rad));
   return spread_class < kClasses ? spread_class : 0;
 }

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "engine/scene/brdf.h"
+#include "engine/scene/material.h"
 #include "engine/scene/mesh.h"
 
 namespace engine {
@@ -18,7 +18,8 @@ struct SimplifiedMesh {
   };
   Mesh mesh;
   std::vector<Surface> surfaces;    ///< by the simplified mesh's material
-  std::vector<Material> materials;  ///< the same, with lobes as wide as they have become
+  std::vector<Material> materials;  ///< the same, with lobes as wide as they have become; measured
+                                    ///< ones cannot be widened
   /// How far the surface that was simplified is from this one, by its area.
   double rms_m = 0;
   double largest_m = 0;  ///< the same, of the furthest place

@@ -29,8 +29,7 @@ std::string text_of(const engine::StarCatalogue& stars, const engine::CameraGeom
   return text;
 }
 
-/// By its parameters a surface is diffuse with an albedo of pi kd; the energy it has left may
-/// shine.
+/// What a surface does not send everywhere alike may shine.
 engine::EarthshineSensor earthshine_sensor(const engine::SensorNoise& noise,
                                            const std::vector<engine::Material>& materials) {
   engine::EarthshineSensor sensor;
@@ -40,9 +39,8 @@ engine::EarthshineSensor earthshine_sensor(const engine::SensorNoise& noise,
   sensor.diffuse_albedo = 0;
   sensor.glossy_albedo = 0;
   for (const engine::Material& m : materials) {
-    const double diffuse = std::min(1.0, engine::kPi * m.parameters.kd);
-    sensor.diffuse_albedo = std::max(sensor.diffuse_albedo, diffuse);
-    if (m.parameters.kb > 0.0) sensor.glossy_albedo = std::max(sensor.glossy_albedo, 1 - diffuse);
+    sensor.diffuse_albedo = std::max(sensor.diffuse_albedo, m.diffuse_albedo());
+    sensor.glossy_albedo = std::max(sensor.glossy_albedo, m.glossy_albedo());
   }
   return sensor;
 }

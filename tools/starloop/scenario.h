@@ -11,7 +11,7 @@
 #include "engine/orbit/passes.h"
 #include "engine/orbit/visibility.h"
 #include "engine/render/render_spec.h"
-#include "engine/scene/brdf.h"
+#include "engine/scene/material.h"
 #include "hil/closed_loop_pointing.h"
 #include "hil/command_port.h"
 #include "hil/faults/fault_spec.h"
