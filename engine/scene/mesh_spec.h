@@ -7,8 +7,8 @@
 #include <Eigen/Core>
 
 #include "engine/core/config_reader.h"
-#include "engine/scene/material.h"
 #include "engine/scene/grouped_mesh.h"
+#include "engine/scene/material.h"
 #include "engine/scene/mesh_report.h"
 
 namespace engine {

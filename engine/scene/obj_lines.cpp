@@ -1,6 +1,7 @@
 #include "engine/scene/obj_lines.h"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 
 #include "engine/core/contract.h"
@@ -73,10 +74,12 @@ bool says_no_number(std::string_view text) {
 
 /// Statements of the format that say nothing about a face's shape or material.
 bool is_other_statement(std::string_view word) {
-  constexpr std::string_view kKnown =
-      " vt vn vp s mtllib mg cstype deg bmat step parm trim hole scrv sp end con bevel c_interp "
-      "d_interp lod shadow_obj trace_obj maplib usemap ctech stech call csh ";
-  return kKnown.find(" " + std::string(word) + " ") != std::string_view::npos;
+  constexpr auto kKnown = std::to_array<std::string_view>(
+      {"vt",     "vn",    "vp",       "s",        "mtllib", "mg",         "cstype",    "deg",
+       "bmat",   "step",  "parm",     "trim",     "hole",   "scrv",       "sp",        "end",
+       "con",    "bevel", "c_interp", "d_interp", "lod",    "shadow_obj", "trace_obj", "maplib",
+       "usemap", "ctech", "stech",    "call",     "csh"});
+  return std::ranges::find(kKnown, word) != kKnown.end();
 }
 
 bool is_without_surface(std::string_view word) {
