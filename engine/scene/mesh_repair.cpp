@@ -1,6 +1,7 @@
 #include "engine/scene/mesh_repair.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <limits>
@@ -202,13 +203,18 @@ class Repair {
     report_.euler_characteristic = std::ranges::count(used, true) -
                                    static_cast<std::int64_t>(topology.edges()) +
                                    static_cast<std::int64_t>(mesh_.triangles.size());
+    std::array<std::vector<std::uint32_t>, 2> lines;
     for (const MeshTopology::Edge& edge : topology.odd_edges()) {
       const bool open = edge.uses == 1;
-      (open ? report_.open_edges : report_.non_manifold_edges).add(line_[edge.triangle]);
+      lines[open ? 1 : 0].push_back(line_[edge.triangle]);
       if (report_.edge_places.size() < MeshReport::kMostPlaces)
         report_.edge_places.push_back(
             {{mesh_.vertices[edge.vertex[0]], mesh_.vertices[edge.vertex[1]]}, open});
     }
+    // Edges come by their vertices; the file's first lines are wanted.
+    for (std::vector<std::uint32_t>& some : lines) std::ranges::sort(some);
+    for (const std::uint32_t line : lines[0]) report_.non_manifold_edges.add(line);
+    for (const std::uint32_t line : lines[1]) report_.open_edges.add(line);
   }
 
   void drop_unused_materials() {

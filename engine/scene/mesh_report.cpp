@@ -14,7 +14,9 @@ void tell(std::vector<std::string>& lines, const MeshDefect& defect, const std::
     text += defect.lines.size() == 1 ? " (line " : " (lines ";
     for (std::size_t i = 0; i < defect.lines.size(); ++i)
       text += (i > 0 ? ", " : "") + std::to_string(defect.lines[i]);
-    text += defect.count > defect.lines.size() ? ", ...)" : ")";
+    text += defect.count > defect.lines.size() && defect.lines.size() == MeshDefect::kMostLines
+                ? ", ...)"
+                : ")";
   }
   lines.push_back(text + more);
 }

@@ -158,6 +158,9 @@ MeshSpec read_mesh_spec(const ConfigReader& config, const std::string& table_nam
 
 GroupedMesh load_mesh(const MeshSpec& spec, MeshReport& report) {
   if (is_built_in(spec.name)) {
+    if (spec.units != "m" || !spec.axes.isIdentity())
+      throw ConfigError("units and axes are for a mesh from a file: \"" + spec.name +
+                        "\" is in metres, body axes");
     GroupedMesh grouped = built_in(spec.name);
     GroupedMesh looked_at = grouped;
     report.vertices = grouped.mesh.vertices.size();

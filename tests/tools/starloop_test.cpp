@@ -543,4 +543,41 @@ TEST(StarloopRender, SeveralTimesGiveFramesAsEachAloneAndASheet) {
   EXPECT_FALSE(fs::exists(folder.path() / "pass.fits"));
 }
 
+TEST(StarloopMesh, TellsAndDrawsWhatIsWrongWithAFile) {
+  const TemporaryFolder folder;
+  const std::string file = folder.path() / "box.obj";
+  // In millimetres, without a lid, one face flipped, one there twice, one without area.
+  std::ofstream(file)
+      << "v 0 0 0\nv 3e3 0 0\nv 3e3 2e3 0\nv 0 2e3 0\nv 0 0 1e3\nv 3e3 0 1e3\n"
+         "v 3e3 2e3 1e3\nv 0 2e3 1e3\nusemtl foil\nf 4 3 2 1\nf 1 2 6 5\nf 6 7 3 2\n"
+         "f 3 4 8 7\nf 4 1 5 8\nf 8 5 1 4\nf 1 1 2\n";
+  const std::string picture = folder.path() / "box.png";
+  const Outcome mesh =
+      starloop({"mesh", file, "--units", "mm", "--axes=z x y", "--json", "-o", picture});
+  ASSERT_EQ(mesh.exit_code, kGood) << mesh.err;
+  const nlohmann::json report = nlohmann::json::parse(mesh.out);
+  EXPECT_EQ(report.at("left_out").at("duplicate").at("first_lines"), nlohmann::json({15}));
+  EXPECT_EQ(report.at("left_out").at("zero_area").at("first_lines"), nlohmann::json({16}));
+  EXPECT_EQ(report.at("mended").at("flipped").at("first_lines"), nlohmann::json({12}));
+  EXPECT_EQ(report.at("told").at("open_edges").at("count"), 4);
+  EXPECT_EQ(report.at("materials").at(0).at("name"), "foil");
+  EXPECT_NEAR(report.at("area_m2").get<double>(), 16.0, 1e-5);
+  EXPECT_NEAR(report.at("high_m").at(0).get<double>(), 1.0, 1e-6);
+  EXPECT_NEAR(report.at("high_m").at(1).get<double>(), 3.0, 1e-6);
+  EXPECT_TRUE(report.at("warnings").empty());
+  EXPECT_GT(fs::file_size(picture), 20'000U);
+  // Nothing else is left beside it.
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), fs::directory_iterator()), 2);
+}
+
+TEST(StarloopMesh, RefusesWhatIsNoMesh) {
+  EXPECT_EQ(starloop({"mesh", "/nowhere/a.obj"}).err,
+            "starloop: /nowhere/a.obj: expected an OBJ mesh, found no file to read\n");
+  EXPECT_EQ(starloop({"mesh", "telescope", "--units", "mm"}).exit_code, kBadInput);
+  EXPECT_EQ(starloop({"mesh", "telescope", "--axes=x y -z"}).exit_code, kBadInput);
+  const Outcome program = starloop({"mesh", STARLOOP_PROGRAM, "-o", ""});
+  EXPECT_EQ(program.exit_code, kBadInput);
+  EXPECT_NE(program.err.find("expected the text of an OBJ mesh"), std::string::npos) << program.err;
+}
+
 }  // namespace

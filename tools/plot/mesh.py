@@ -70,7 +70,7 @@ def draw_view(axes, view, picture):
             tell(f"{name}, m")
     if right.startswith("-"):
         ticks = axes.get_xticks()
-        axes.set_xticks(ticks, [f"{-t:g}" for t in ticks])
+        axes.set_xticks(ticks, [f"{-t:g}" if t else "0" for t in ticks])
         axes.set_xlim(left, left + side)
         axes.set_xlabel(f"{right[1:]}, m")
     if not right and not up:

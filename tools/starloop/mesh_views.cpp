@@ -46,8 +46,17 @@ class Viewer {
         mesh_(centred(mesh, middle_m_)),
         scene_(mesh_) {}
 
-  void draw(MeshView& view, cv::Mat& picture) {
-    view.side_m = 2.0 * kMargin * radius_m_;
+  /// How far the body reaches in a view, from its middle.
+  [[nodiscard]] double reach_m(const MeshView& view) const {
+    double reach = 0;
+    for (const Vector3f& v : mesh_.vertices)
+      reach = std::max({reach, std::abs(view.right.dot(v.cast<double>())),
+                        std::abs(view.up.dot(v.cast<double>()))});
+    return reach;
+  }
+
+  void draw(MeshView& view, double side_m, cv::Mat& picture) {
+    view.side_m = side_m;
     const Vector2d middle(view.right.dot(middle_m_), view.up.dot(middle_m_));
     view.low_m = middle - Vector2d::Constant(0.5 * view.side_m);
     const Vector3d toward = view.right.cross(view.up);
@@ -116,11 +125,14 @@ std::vector<MeshView> draw_views(const engine::Mesh& mesh, const engine::MeshRep
   Viewer viewer(mesh, report);
   std::vector<MeshView> views = all_views();
   cv::Mat strip(kSide_px, kSide_px * static_cast<int>(views.size()), CV_8UC3);
+  double side_m = 0;
+  for (const MeshView& view : views)
+    side_m = std::max(side_m, 2.0 * kMargin * viewer.reach_m(view));
   int left = 0;
   for (MeshView& view : views) {
     cv::Mat picture = strip.colRange(left, left + kSide_px);
     left += kSide_px;
-    viewer.draw(view, picture);
+    viewer.draw(view, side_m, picture);
     for (const auto& edge : report.edge_places)
       if (view.lines.size() < kMostLines) view.lines.push_back(viewer.line(view, edge));
   }
