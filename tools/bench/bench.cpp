@@ -11,6 +11,8 @@
 #include "engine/detector/noise_lanes.h"
 #include "engine/orbit/kepler.h"
 #include "engine/orbit/sun_track.h"
+#include "engine/scene/mesh_repair.h"
+#include "engine/scene/obj_file.h"
 #include "tools/starloop/rig.h"
 #include "tools/starloop/scenario.h"
 
@@ -175,6 +177,50 @@ BENCHMARK(bench_earth_background)
     ->ArgNames({"none_full_limb", "even_map"})
     ->ArgsProduct({{0, 1, 2}, {0, 1}})
     ->Unit(benchmark::kMicrosecond);
+
+/// A ball of a million triangles, as an exporter writes it.
+const std::string& ball_text() {
+  static const std::string text = [] {
+    constexpr int kRings = 501;
+    constexpr int kSides = 1000;
+    std::string obj = "usemtl white\n";
+    char line[160];
+    for (int i = 0; i < kRings; ++i) {
+      for (int k = 0; k < kSides; ++k) {
+        const double polar = kPi * (i + 0.5) / kRings;
+        const double azimuth = 2.0 * kPi * k / kSides;
+        std::snprintf(line, sizeof line, "v %.6f %.6f %.6f\n", std::sin(polar) * std::cos(azimuth),
+                      std::sin(polar) * std::sin(azimuth), std::cos(polar));
+        obj += line;
+      }
+    }
+    for (int i = 0; i + 1 < kRings; ++i) {
+      for (int k = 0; k < kSides; ++k) {
+        const int a = i * kSides + k + 1;
+        const int b = i * kSides + (k + 1) % kSides + 1;
+        std::snprintf(line, sizeof line, "f %d//%d %d//%d %d//%d\nf %d//%d %d//%d %d//%d\n", a, a,
+                      a + kSides, a, b + kSides, a, a, a, b + kSides, a, b, a);
+        obj += line;
+      }
+    }
+    return obj;
+  }();
+  return text;
+}
+void bench_load_mesh(benchmark::State& state) {
+  for (auto _ : state) {
+    MeshReport report;
+    ObjFile file = obj_from_text(ball_text(), "ball.obj", report);
+    if (state.range(0) > 0) repair(file.grouped, std::move(file.line), report);
+    if (state.range(0) > 1)
+      benchmark::DoNotOptimize(smooth_normals(file.grouped.mesh, 40.0 * kDegree));
+    benchmark::DoNotOptimize(file);
+  }
+}
+BENCHMARK(bench_load_mesh)
+    ->ArgName("read_repair_normals")
+    ->DenseRange(0, 2, 1)
+    ->Unit(benchmark::kMillisecond);
 
 void bench_brdf_eval(benchmark::State& state) {
   const Brdf brdf({}, state.range(0) == 0 ? Brdf::Variant::kPhysical : Brdf::Variant::kPaper);

@@ -65,7 +65,7 @@ TEST(ObjFile, CoversADiscOfManyCornersWithoutNeedles) {
   for (int i = 0; i < corners; ++i) {
     const double a = 2.0 * M_PI * i / corners;
     text += "v " + std::to_string(std::cos(a)) + " " + std::to_string(std::sin(a)) + " 0\n";
-    face += " " + std::to_string(i + 1);
+    face.append(" ").append(std::to_string(i + 1));
   }
   const LoadedObj disc = load_obj(text + face);
   EXPECT_EQ(disc.mesh().triangles.size(), 718U);
