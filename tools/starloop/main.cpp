@@ -152,6 +152,32 @@ int run_command(int argc, char** argv) {
   mesh_app->add_option("-o,--out", mesh.out, "PNG of five views; \"\": none")
       ->capture_default_str();
 
+  std::string materials_folder;
+  CLI::App* materials_app = app.add_subcommand(
+      "materials", "Say of every material where it would make light, and where its lobe is");
+  add_common(*materials_app, common);
+  materials_app->add_option("-o,--out", materials_folder,
+                            "folder that gets albedo.csv, lobes.csv and a picture of both");
+
+  starloop::FitBrdfOptions fit;
+  CLI::App* fit_app = app.add_subcommand(
+      "fit-brdf", "Fit the five-parameter BRDF to measured points, with its uncertainty");
+  fit_app->add_option("samples", fit.samples, "CSV of measured points: docs/materials.md")
+      ->required();
+  fit_app
+      ->add_option("--variant", fit.variant,
+                   "what the diffuse term is: kd (physical), or kd/cos_i (paper)")
+      ->check(CLI::IsMember({"physical", "paper"}))
+      ->capture_default_str();
+  fit_app
+      ->add_option("--fix", fit.fixed,
+                   "hold a parameter: kd=0.05; ar, br, kb, kd, kr; may be given many times")
+      ->allow_extra_args(false);
+  fit_app->add_option("--name", fit.name, "of the material in the block to paste")
+      ->capture_default_str();
+  fit_app->add_option("-o,--out", fit.out, "folder that gets fit.csv, material.toml and fit.png");
+  fit_app->add_flag("-q,--quiet", fit.quiet, "print the block to paste, and complaints");
+
   std::string bench_folder = "characterize";
   CLI::App* bench_app = app.add_subcommand(
       "characterize",
@@ -187,6 +213,8 @@ int run_command(int argc, char** argv) {
     return app.exit(e) == 0 ? starloop::kGood : starloop::kBadInput;
   }
   set_up_messages(common.quiet || replay.quiet);
+  if (materials_app->parsed()) return starloop::show_materials(common, materials_folder);
+  if (fit_app->parsed()) return starloop::fit_brdf(fit);
   if (run_app->parsed()) return starloop::run_pass(common, run);
   if (soak_app->parsed()) return starloop::soak(common, soak);
   if (replay_app->parsed()) return starloop::replay_log(replay);

@@ -166,6 +166,8 @@ int render_frames(const CommonOptions& options, const RenderOptions& render) {
     if (!options.quiet)
       for (const std::string& note : orbit_notes(scenario, shot.shutter_open))
         std::printf("%s\n", note.c_str());
+    if (!options.quiet && i == 0)
+      for (const std::string& note : rig.material_notes()) std::printf("%s\n", note.c_str());
     if (!options.quiet) tell(fits.string(), png, scenario, rig.star_text(), report);
   }
   budgets.close();

@@ -102,6 +102,7 @@ Rig::Stages Rig::make_stages(const Scenario& scenario) {
                  .build(predicted_shot(*scenario.parts_frozen_at, scenario.run.exposure));
   const SceneBodies bodies = make_bodies(scenario, frozen ? &*frozen : nullptr);
   triangles_ = bodies.triangles();
+  material_notes_ = bodies.material_notes();
   if (render.mesh_level == engine::MeshLevelChoice::kAuto && bodies.others.empty())
     engine::add_mesh_levels(*bodies.target, scenario.materials, render);
   std::unique_ptr<engine::Starlight> stars;

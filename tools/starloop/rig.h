@@ -46,6 +46,10 @@ class Rig {
   [[nodiscard]] std::size_t triangles() const noexcept { return triangles_; }
   /// A line about the catalogue of stars; empty when there is none.
   [[nodiscard]] const std::string& star_text() const noexcept { return star_text_; }
+  /// A line for each material that a user should know something about.
+  [[nodiscard]] const std::vector<std::string>& material_notes() const noexcept {
+    return material_notes_;
+  }
 
  private:
   [[nodiscard]] std::vector<engine::Companion> move_companions(const Scenario& scenario);
@@ -62,6 +66,7 @@ class Rig {
   engine::WorkerPool pool_;
   std::size_t triangles_ = 0;
   std::string star_text_;
+  std::vector<std::string> material_notes_;
   std::unique_ptr<engine::SceneGenerator> generator_;
 };
 

@@ -29,6 +29,7 @@ void introduce(const Flight::Plan& plan, const Rig& rig, const Flight& flight) {
   for (const std::string& note : orbit_notes(scenario, pass.closest)) spdlog::info("{}", note);
   if (const std::string note = leap_second_note(scenario); !note.empty()) spdlog::warn("{}", note);
   if (!rig.star_text().empty()) spdlog::info("{}", rig.star_text());
+  for (const std::string& note : rig.material_notes()) spdlog::info("{}", note);
   spdlog::info("{}", flight.text());
 }
 

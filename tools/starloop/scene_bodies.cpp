@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "engine/core/contract.h"
+#include "engine/scene/brdf_check.h"
 #include "engine/scene/mesh_spec.h"
 
 namespace starloop {
@@ -150,6 +151,23 @@ std::size_t SceneBodies::triangles() const {
   for (const auto& companion : others.companions) sum += companion->mesh.triangles.size();
   for (const auto& part : others.parts) sum += part.shape->mesh.triangles.size();
   return sum;
+}
+
+std::vector<std::string> SceneBodies::material_notes() const {
+  std::map<std::string, std::string> by_name;
+  // Parts know no other materials than their bodies.
+  const auto add = [&](const TracedTarget& body) {
+    const std::vector<std::string>& names = body.mesh.material_names;
+    for (std::uint32_t m = 0; m < names.size(); ++m)
+      if (!by_name.contains(names[m]))
+        by_name[names[m]] = engine::brdf_note(names[m], engine::check_brdf(body.facets.brdf(m)));
+  };
+  add(*target);
+  for (const auto& companion : others.companions) add(*companion);
+  std::vector<std::string> notes;
+  for (const auto& [name, note] : by_name)
+    if (!note.empty()) notes.push_back(note);
+  return notes;
 }
 
 SceneBodies make_bodies(const Scenario& scenario, const engine::Snapshot* frozen) {

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "engine/render/other_bodies.h"
 #include "engine/render/traced_target.h"
@@ -17,6 +19,8 @@ struct SceneBodies {
 
   /// Of all bodies, each for itself.
   [[nodiscard]] std::size_t triangles() const;
+  /// A line for each material that a user should know something about.
+  [[nodiscard]] std::vector<std::string> material_notes() const;
 };
 
 /// Reads the meshes. With a snapshot parts are fixed to their bodies as they stand in it, and there

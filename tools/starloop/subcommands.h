@@ -65,6 +65,21 @@ struct MtfOptions {
 /// over the plane, and draws them.
 int export_mtf(const CommonOptions& options, const MtfOptions& mtf);
 
+/// Says of every material of a scenario what it does with light, and draws it; `out` is a folder,
+/// empty for none.
+int show_materials(const CommonOptions& options, const std::string& out);
+
+struct FitBrdfOptions {
+  std::string samples;  ///< CSV of measured points: engine/scene/brdf_points.h
+  std::string variant = "physical";
+  std::vector<std::string> fixed;  ///< "kd=0.05"
+  std::string name = "measured";   ///< of the material
+  std::string out;                 ///< folder that gets table and picture; empty: none
+  bool quiet = false;
+};
+/// Fits the five-parameter model to measured points and says how well they know it.
+int fit_brdf(const FitBrdfOptions& options);
+
 /// Measures the scenario's camera on a bench, beside what the scenario says; `out` is a folder.
 int characterize_camera(const CommonOptions& options, const std::string& out);
 
