@@ -96,7 +96,7 @@ def main():
             axes.set_xlabel("off the mirror, in plane, deg")
     seen = np.concatenate([points[points[:, 2] > 0, 2], curves[curves[:, 2] > 0, 2]])
     first.set_ylim(0.4 * max(seen.min(), seen.max() * 1e-6), 3 * seen.max())
-    first.legend(frameon=False, fontsize=9, loc="upper left")
+    first.legend(frameon=False, fontsize=9, loc="lower center")
     draw_residuals(figure.add_subplot(grid[rows, :]), points)
     figure.tight_layout()
     figure.savefig(folder / "fit.png", dpi=110)
