@@ -47,6 +47,21 @@ Bracket bracket_of(const std::vector<double>& rising, double x) noexcept {
   return {low, std::min(1.0, (x - rising[low]) / (rising[low + 1] - rising[low]))};
 }
 
+/// Between values that are given by their logarithms: a lobe falls by factors. Where one of them is
+/// 0 the values themselves are weighed.
+template <std::size_t kCorners>
+double exponential_of(const std::array<double, kCorners>& weights,
+                      const std::array<double, kCorners>& logarithms) noexcept {
+  constexpr double kOfNothing = -std::numeric_limits<double>::infinity();
+  double sum = 0;
+  if (std::ranges::find(logarithms, kOfNothing) == logarithms.end()) {
+    for (std::size_t i = 0; i < kCorners; ++i) sum += weights[i] * logarithms[i];
+    return std::exp(sum);
+  }
+  for (std::size_t i = 0; i < kCorners; ++i) sum += weights[i] * std::exp(logarithms[i]);
+  return sum;
+}
+
 /// Even over the disc, so over the hemisphere by the cosine.
 Vector3d even_direction(std::size_t i, std::size_t count) noexcept {
   constexpr double kGoldenTurn = 2.399963229728653;
@@ -158,7 +173,7 @@ BrdfGrid::Scan BrdfGrid::scan_of(const BrdfPoints& points, Readings& readings) {
                     "is in a row with a hole: " + where + " there is no point at " +
                         (polar ? "theta_out_deg " : "in_plane_deg ") + text_of(first_deg) +
                         (polar ? ", azimuth_deg " : ", out_of_plane_deg ") + text_of(second_deg));
-      values.push_back(one_value ? mean : readings.value(it->second));
+      values.push_back(std::log(one_value ? mean : readings.value(it->second)));
     }
     scan.values.insert(scan.values.end(), values.begin(), values.end());
   }
@@ -181,8 +196,9 @@ double BrdfGrid::Scan::value(const Vector3d& out) const noexcept {
   const std::size_t right = columns > 1 ? 1 : 0;
   const double* low = values.data() + row.low * columns + column.low;
   const double* high = low + columns;
-  return (1.0 - row.part) * ((1.0 - column.part) * low[0] + column.part * low[right]) +
-         row.part * ((1.0 - column.part) * high[0] + column.part * high[right]);
+  return exponential_of<4>({(1.0 - row.part) * (1.0 - column.part), (1.0 - row.part) * column.part,
+                            row.part * (1.0 - column.part), row.part * column.part},
+                           {low[0], low[right], high[0], high[right]});
 }
 
 double BrdfGrid::at_place(const Scan& scan, const Place& place) noexcept {
@@ -228,7 +244,8 @@ double BrdfGrid::at(const Vector3d& in, const Vector3d& out) const noexcept {
   const double from_low = at_place(low, place);
   if (held) return from_low;
   const double part = (theta - low.theta_in_rad) / (above->theta_in_rad - low.theta_in_rad);
-  return (1.0 - part) * from_low + part * at_place(*above, place);
+  return exponential_of<2>({1.0 - part, part},
+                           {std::log(from_low), std::log(at_place(*above, place))});
 }
 
 double BrdfGrid::coverage(std::size_t i) const noexcept {

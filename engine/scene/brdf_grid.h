@@ -11,9 +11,9 @@ namespace engine {
 /// A measured BRDF between its points: for every incidence a grid of the angles of scatter.
 ///
 /// The grids may differ from one incidence to the next, their steps may be uneven. Within a grid:
-/// bilinear in its own two angles; beyond its edge the edge's value holds. Between two incidences
-/// points are matched that lie alike about the mirror direction, so that a narrow lobe moves
-/// with it and does not become two: alike in azimuth about it and in half-vector distance,
+/// the logarithm is bilinear in both angles; beyond its edge the edge's value holds. Between two
+/// incidences points are matched that lie alike about the mirror direction, so that a narrow lobe
+/// moves with it and does not become two: alike in azimuth about it and in half-vector distance,
 /// |b - b0| / (2 cos theta) with b the direction's projection onto the surface (b0 the mirror's;
 /// near it that is the tilt of the half vector, Rusinkiewicz 1998,
 /// DOI 10.1007/978-3-7091-6453-2_2); further out the distance is bent by 1/r - 1/r(horizon), which
@@ -22,9 +22,10 @@ namespace engine {
 /// b.
 ///
 /// Isotropic: the two sides of the plane of incidence are one, and readings of both are averaged;
-/// so are all azimuths of normal incidence, where they are polar. Leaves out polarisation, colour
-/// and noise: a table's noise is part of the surface. Thread: any. Loop-safe but for the
-/// constructor.
+/// so are all azimuths of normal incidence, where they are polar.
+/// Leaves out polarisation, colour and noise: a table's noise is part of the surface.
+///
+/// Thread: any. Loop-safe but for the constructor.
 class BrdfGrid {
  public:
   /// Throws ConfigError with path and line: two points for one direction, holes in a grid, one
@@ -51,7 +52,7 @@ class BrdfGrid {
     double scale = 0;                ///< 2 cos theta_in
     std::vector<double> first_rad;   ///< rising
     std::vector<double> second_rad;  ///< rising, not negative
-    std::vector<double> values;      ///< by first, then second
+    std::vector<double> values;      ///< logarithms, by first, then second
     ScatterAngles angles = ScatterAngles::kPlanes;
 
     [[nodiscard]] double value(const Eigen::Vector3d& out) const noexcept;

@@ -46,6 +46,7 @@ struct FacetGeometry {
 ///    integral; polyimide's albedo changes by 1 % at 3 deg of wrinkles, at 15 deg by -7 % in near
 ///    normal light and +11 % at 80 deg.
 /// A Lambert surface is kb = 0. Leaves out colour and polarisation.
+///
 /// Thread: any. Loop-safe but for the constructor, which takes a tenth of a second.
 class FiveParameterBrdf {
  public:

@@ -16,6 +16,7 @@ namespace engine {
 /// was measured one way then helps where nobody measured the other. Without it the table stands as
 /// it is, from light to camera. Where the albedo is above 1 the value is scaled down, alike for
 /// both directions. All vectors are unit, in a frame whose z is the normal.
+///
 /// Thread: any. Loop-safe but for the constructor, which takes half a second.
 class TabulatedBrdf {
  public:

@@ -58,9 +58,10 @@ TEST(BrdfGrid, LobeMovesWithTheMirrorBetweenIncidences) {
       }
     }
     EXPECT_NEAR(brightest_deg, theta_deg, 0.1);
-    // Between incidences 10 deg apart the peak itself goes with 1 / cos^2, which the chord
-    // overestimates by (10 deg)^2 / 8 of its second derivative: 1.5 % at 45 deg, 4 % at 55.
-    EXPECT_NEAR(brightest / of_polyimide(in, in_plane(theta_deg)), 1.0, 0.05) << theta_deg;
+    // Between incidences 10 deg apart the peak goes with 1 / cos^2, whose logarithm the chord
+    // overestimates by (10 deg)^2 / 8 of its second derivative, 2 / cos^2: 1.5 % at 45 deg, 2.3 at
+    // 55; the masking and the fresnel-like term are slow.
+    EXPECT_NEAR(brightest / of_polyimide(in, in_plane(theta_deg)), 1.0, 0.03) << theta_deg;
     // Interpolation at the same angles of scatter is brightest at a neighbour's mirror, 5 deg off,
     // half as bright as this, and four times too bright 5 deg aside.
     for (const double off : {-5.0, -3.0, 3.0, 5.0})
