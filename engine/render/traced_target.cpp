@@ -14,7 +14,9 @@ std::string material_missing(const std::string& name) {
          name;
 }
 
-std::vector<Brdf> in_mesh_order(const Mesh& mesh, const std::vector<Material>& materials) {
+}  // namespace
+
+std::vector<Brdf> brdfs_of(const Mesh& mesh, const std::vector<Material>& materials) {
   std::vector<Brdf> brdfs;
   std::vector<const Material*> made;
   for (const std::string& name : mesh.material_names) {
@@ -30,12 +32,13 @@ std::vector<Brdf> in_mesh_order(const Mesh& mesh, const std::vector<Material>& m
   return brdfs;
 }
 
-}  // namespace
-
 TracedTarget::TracedTarget(Mesh its_mesh, const std::vector<Material>& materials)
+    : TracedTarget(its_mesh, brdfs_of(its_mesh, materials)) {}
+
+TracedTarget::TracedTarget(Mesh its_mesh, std::vector<Brdf> brdfs)
     : mesh(std::move(its_mesh)),
       bounding_radius_m(mesh.bounding_radius_m()),
       scene(mesh),
-      facets(mesh, in_mesh_order(mesh, materials)) {}
+      facets(mesh, std::move(brdfs)) {}
 
 }  // namespace engine

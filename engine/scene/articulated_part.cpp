@@ -18,6 +18,7 @@ namespace {
 
 // A direction nearer to the axis than this says nothing about an angle round it.
 constexpr double kAlongAxis = 1e-6;
+constexpr double kRounding_rad = 1e-9;
 // Axes that a user has written with a few decimals count as upright.
 constexpr double kUpright = 1e-3;
 
@@ -41,6 +42,8 @@ Limited limited(double angle_rad, const std::optional<PartSpec::Limits>& limits)
   const double from_low = angle_rad - low;
   const double turned = low + from_low - 2.0 * kPi * std::floor(from_low / (2.0 * kPi));
   if (turned <= high) return {turned, false};
+  // Rounding must not take what stands at its first place for the last but one of a turn later.
+  if (low + 2.0 * kPi - turned < kRounding_rad) return {low, false};
   return {turned - high < low + 2.0 * kPi - turned ? high : low, true};
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -61,7 +62,7 @@ class ArticulatedPart {
 
   [[nodiscard]] const PartSpec& spec() const noexcept { return spec_; }
   /// `toward`: what it follows, in the body's axes, of any length. When that lies along the axis,
-  /// or is no direction at all, the part stays as the mesh has it.
+  /// or is no direction at all, the part stands at its angle_rad.
   [[nodiscard]] PartPose pose(const Eigen::Vector3d& toward, Duration since_epoch) const noexcept;
 
  private:

@@ -1,6 +1,7 @@
 #include "tools/starloop/scene_bodies.h"
 
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <deque>
 #include <map>
@@ -41,7 +42,7 @@ std::string listed(const std::vector<std::string>& names) {
   return text;
 }
 
-/// Makes each shape once.
+/// Takes meshes apart, and makes each shape once.
 class Workshop {
  public:
   explicit Workshop(const Scenario& scenario) : scenario_(scenario) {}
@@ -49,18 +50,7 @@ class Workshop {
   /// What is left of a body without its parts.
   std::shared_ptr<TracedTarget> body(std::size_t owner) {
     const File& file = read(owner);
-    std::vector<bool> rest(file.grouped.group_names.size(), true);
-    for (const PartSpec& part : scenario_.parts) {
-      if (part.owner != owner) continue;
-      const std::vector<bool> own = groups_of(part, file);
-      for (std::size_t i = 0; i < own.size(); ++i) {
-        if (own[i] && !rest[i]) {
-          throw ConfigError(part.where + " has the group \"" + file.grouped.group_names[i] +
-                            "\", which another part has, too");
-        }
-        rest[i] = rest[i] && !own[i];
-      }
-    }
+    const std::vector<bool> rest = rest_of(owner, file);
     return shape(file, rest, Eigen::Vector3d::Zero());
   }
   /// With its hinge in the origin.
@@ -68,12 +58,35 @@ class Workshop {
     const File& file = read(part.owner);
     return shape(file, groups_of(part, file), part.hinge_m);
   }
+  /// A body and its parts in one, as they stand.
+  std::shared_ptr<TracedTarget> body_as(std::size_t owner, const engine::Snapshot& as) {
+    const File& file = read(owner);
+    const Eigen::Matrix3d owner_from_target =
+        owner == 0 ? Eigen::Matrix3d::Identity() : as.companion[owner - 1].from_target.matrix;
+    engine::Mesh whole = file.grouped.part(rest_of(owner, file));
+    for (std::size_t i = 0; i < scenario_.parts.size(); ++i) {
+      const PartSpec& spec = scenario_.parts[i];
+      if (spec.owner != owner) continue;
+      const Eigen::Matrix3d to_owner =
+          owner_from_target * as.part[i].from_target.matrix.transpose();
+      const engine::Mesh part = at_hinge(file, groups_of(spec, file), spec.hinge_m);
+      const auto first = static_cast<std::uint32_t>(whole.vertices.size());
+      for (const Eigen::Vector3f& v : part.vertices)
+        whole.vertices.push_back((to_owner * v.cast<double>() + spec.hinge_m).cast<float>());
+      for (engine::Mesh::Triangle triangle : part.triangles) {
+        for (std::uint32_t& corner : triangle.corner) corner += first;
+        whole.triangles.push_back(triangle);  // of one file, materials have one order
+      }
+    }
+    return std::make_shared<TracedTarget>(std::move(whole), file.brdfs);
+  }
 
  private:
   struct File {
     std::size_t number = 0;
     const MeshSpec& spec;
     GroupedMesh grouped;
+    std::vector<engine::Brdf> brdfs;
   };
   using Key = std::tuple<std::size_t, std::vector<bool>, std::array<double, 3>>;
 
@@ -82,7 +95,9 @@ class Workshop {
     const auto same =
         std::ranges::find_if(files_, [&](const File& file) { return file.spec.same_body(spec); });
     if (same != files_.end()) return *same;
-    files_.push_back({files_.size(), spec, load(spec, scenario_.materials)});
+    GroupedMesh grouped = load(spec, scenario_.materials);
+    std::vector<engine::Brdf> brdfs = engine::brdfs_of(grouped.mesh, scenario_.materials);
+    files_.push_back({files_.size(), spec, std::move(grouped), std::move(brdfs)});
     return files_.back();
   }
 
@@ -97,20 +112,43 @@ class Workshop {
       }
       groups[static_cast<std::size_t>(it - names.begin())] = true;
     }
+    const std::vector<std::uint32_t>& all = file.grouped.group;
+    if (std::ranges::none_of(all, [&](std::uint32_t group) { return groups[group]; }))
+      throw ConfigError(part.where + " names groups without a face that can be used");
     return groups;
   }
 
-  std::shared_ptr<TracedTarget> shape(const File& file, const std::vector<bool>& groups,
-                                      const Eigen::Vector3d& origin_m) {
-    std::shared_ptr<TracedTarget>& made =
-        shapes_[{file.number, groups, {origin_m.x(), origin_m.y(), origin_m.z()}}];
-    if (made != nullptr) return made;
-    engine::Mesh own = file.grouped.part(groups);
-    if (own.triangles.empty()) {
-      throw ConfigError(file.spec.where + ": the parts that turn leave nothing of the body itself");
+  std::vector<bool> rest_of(std::size_t owner, const File& file) const {
+    std::vector<bool> rest(file.grouped.group_names.size(), true);
+    for (const PartSpec& part : scenario_.parts) {
+      if (part.owner != owner) continue;
+      const std::vector<bool> own = groups_of(part, file);
+      for (std::size_t i = 0; i < own.size(); ++i) {
+        if (own[i] && !rest[i]) {
+          throw ConfigError(part.where + " has the group \"" + file.grouped.group_names[i] +
+                            "\", which another part has, too");
+        }
+        rest[i] = rest[i] && !own[i];
+      }
     }
-    for (Eigen::Vector3f& v : own.vertices) v = (v.cast<double>() - origin_m).cast<float>();
-    made = std::make_shared<TracedTarget>(std::move(own), scenario_.materials);
+    if (std::ranges::none_of(file.grouped.group, [&](std::uint32_t group) { return rest[group]; }))
+      throw ConfigError(file.spec.where + ": the parts that turn leave nothing of the body itself");
+    return rest;
+  }
+
+  static engine::Mesh at_hinge(const File& file, const std::vector<bool>& groups,
+                               const Eigen::Vector3d& hinge_m) {
+    engine::Mesh own = file.grouped.part(groups);
+    for (Eigen::Vector3f& v : own.vertices) v = (v.cast<double>() - hinge_m).cast<float>();
+    return own;
+  }
+
+  std::shared_ptr<TracedTarget> shape(const File& file, const std::vector<bool>& groups,
+                                      const Eigen::Vector3d& hinge_m) {
+    std::shared_ptr<TracedTarget>& made =
+        shapes_[{file.number, groups, {hinge_m.x(), hinge_m.y(), hinge_m.z()}}];
+    if (made == nullptr)
+      made = std::make_shared<TracedTarget>(at_hinge(file, groups, hinge_m), file.brdfs);
     return made;
   }
 
@@ -118,31 +156,6 @@ class Workshop {
   std::deque<File> files_;
   std::map<Key, std::shared_ptr<TracedTarget>> shapes_;
 };
-
-/// Each body that has some becomes one mesh with them.
-void fix_parts(const Scenario& scenario, const engine::Snapshot& as, Workshop& workshop,
-               std::vector<std::shared_ptr<TracedTarget>>& bodies) {
-  std::map<std::size_t, engine::Mesh> whole;
-  for (std::size_t i = 0; i < scenario.parts.size(); ++i) {
-    const PartSpec& spec = scenario.parts[i];
-    engine::Mesh& mesh = whole.try_emplace(spec.owner, bodies[spec.owner]->mesh).first->second;
-    const engine::PartView& view = as.part[i];
-    const Eigen::Matrix3d owner_from_target = spec.owner == 0
-                                                  ? Eigen::Matrix3d::Identity()
-                                                  : as.companion[spec.owner - 1].from_target.matrix;
-    const Eigen::Matrix3d to_owner = owner_from_target * view.from_target.matrix.transpose();
-    const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
-    const engine::Mesh& part = workshop.part(spec)->mesh;
-    for (const Eigen::Vector3f& v : part.vertices)
-      mesh.vertices.push_back((to_owner * v.cast<double>() + spec.hinge_m).cast<float>());
-    for (engine::Mesh::Triangle triangle : part.triangles) {
-      for (std::uint32_t& corner : triangle.corner) corner += first;
-      mesh.triangles.push_back(triangle);  // of one file, materials have one order
-    }
-  }
-  for (auto& [owner, mesh] : whole)
-    bodies[owner] = std::make_shared<TracedTarget>(std::move(mesh), scenario.materials);
-}
 
 }  // namespace
 
@@ -172,18 +185,18 @@ std::vector<std::string> SceneBodies::material_notes() const {
 
 SceneBodies make_bodies(const Scenario& scenario, const engine::Snapshot* frozen) {
   Workshop workshop(scenario);
-  std::vector<std::shared_ptr<TracedTarget>> bodies;
-  for (std::size_t owner = 0; owner <= scenario.companions.size(); ++owner)
-    bodies.push_back(workshop.body(owner));
+  const auto body = [&](std::size_t owner) {
+    const bool has_parts = std::ranges::any_of(
+        scenario.parts, [owner](const PartSpec& part) { return part.owner == owner; });
+    return frozen != nullptr && has_parts ? workshop.body_as(owner, *frozen) : workshop.body(owner);
+  };
   SceneBodies all;
-  if (frozen != nullptr) {
-    fix_parts(scenario, *frozen, workshop, bodies);
-  } else {
-    for (const PartSpec& part : scenario.parts)
-      all.others.parts.push_back({workshop.part(part), part.owner});
-  }
-  all.target = bodies.front();
-  all.others.companions.assign(bodies.begin() + 1, bodies.end());
+  all.target = body(0);
+  for (std::size_t i = 0; i < scenario.companions.size(); ++i)
+    all.others.companions.push_back(body(i + 1));
+  if (frozen != nullptr) return all;
+  for (const PartSpec& part : scenario.parts)
+    all.others.parts.push_back({workshop.part(part), part.owner});
   return all;
 }
 

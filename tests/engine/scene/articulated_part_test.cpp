@@ -169,6 +169,12 @@ TEST(ArticulatedPart, StopsAtTheNearerEndOfItsRange) {
   EXPECT_NEAR(angle_deg(210.0), 200.0, 1e-12);
   EXPECT_NEAR(angle_deg(-40.0), -30.0, 1e-12);
   EXPECT_TRUE(part.pose({0, -1, 0}, {}).at_limit);
+  // What stands at an end is not kept from anything, whichever way it rounds.
+  spec.limits_rad = PartSpec::Limits{0.0, 0.5 * kPi};
+  for (const double off : {-1e-15, 0.0, 1e-15}) {
+    EXPECT_FALSE(ArticulatedPart(spec).pose({1, off, 0.4}, {}).at_limit) << off;
+    EXPECT_NEAR(ArticulatedPart(spec).pose({1, off, 0.4}, {}).angle_rad, 0.0, 1e-14) << off;
+  }
   EXPECT_FALSE(part.pose({0, 1, 0}, {}).at_limit);
 }
 
