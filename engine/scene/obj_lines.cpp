@@ -34,6 +34,13 @@ std::string_view next_word(std::string_view& text) {
   return word;
 }
 
+/// A comment ends with its line, even one like "# from C:\models\".
+bool has_comment(std::string_view text) noexcept {
+  for (std::size_t i = 0; i < text.size(); ++i)
+    if (text[i] == '#' && (i == 0 || is_blank(text[i - 1]))) return true;
+  return false;
+}
+
 std::size_t digits_at(std::string_view text) noexcept {
   std::size_t n = 0;
   while (n < text.size() && text[n] >= '0' && text[n] <= '9') ++n;
@@ -120,7 +127,7 @@ bool ObjLines::next_line() {
       fail(lines_taken_, "expected a line of at most 1 MiB, found a longer one");
     if (part.find('\0') != std::string_view::npos)
       fail(lines_taken_, "expected the text of an OBJ mesh, found a zero byte");
-    const bool continued = part.ends_with('\\');
+    const bool continued = part.ends_with('\\') && !has_comment(part);
     if (continued) part.remove_suffix(1);
     if (joined_.empty() && !continued) {
       line_text_ = part;

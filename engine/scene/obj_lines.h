@@ -15,8 +15,8 @@ namespace engine {
 /// The importer believes its input: version 2.0.0~rc10 takes an index of fifteen digits modulo
 /// 2^32, a relative one before the first vertex as it is (TALOS-2020-1212), and "nan" as zero. So
 /// it gets v, f, g, o and usemtl alone, numbers that have the form of a number, indices of nine
-/// digits at most, and no texture coordinates or normals, which nothing here uses. Comments,
-/// lines that are continued, and every sort of line end are dealt with here.
+/// digits at most after their zeros, and no texture coordinates or normals, which nothing here
+/// uses. Comments, lines that are continued, and every sort of line end are dealt with here.
 ///
 /// All failures throw ConfigError, "file:line: expected ..., found ...".
 class ObjLines final : public std::streambuf {

@@ -13,8 +13,12 @@ namespace engine {
 ///
 /// A quad along its shorter diagonal, or the one that stays inside where it is dented; more corners
 /// by clipping ears. The same corners from another one on give the same triangles, so that a face
-/// written twice can be told. Appends indices into `corners`. False: the face crosses itself; then
-/// the triangles are as many, and that is all.
+/// written twice can be told. A corner at the place of the next one is passed over: it pads a
+/// triangle to a quad. Appends indices into `corners`. False: the face crosses itself; then the
+/// triangles are as many, and that is all. So they are of a face with a corner that is no number,
+/// and each such corner is in one of them.
+///
+/// Takes time as the square of the corners at most.
 ///
 /// Source of the ears: Meisters 1975, Polygons have ears, DOI 10.2307/2319703.
 [[nodiscard]] bool cut_polygon(std::span<const Eigen::Vector3f> corners,

@@ -1,6 +1,8 @@
 #include "engine/scene/obj_file.h"
 
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <string>
@@ -74,6 +76,53 @@ TEST(ObjFile, CoversADiscOfManyCornersWithoutNeedles) {
   EXPECT_EQ(disc.report.tangled.count, 0U);
 }
 
+/// A band that winds outwards, along one side of it and back along the other.
+std::vector<Vector3f> spiral(std::size_t corners) {
+  constexpr double kPerTurn = 60;
+  std::vector<Vector3f> ring;
+  for (std::size_t i = 0; i < corners; ++i) {
+    const bool out = i < corners / 2;
+    const double turns = static_cast<double>(out ? i : corners - 1 - i) / kPerTurn;
+    const double r = 1.0 + turns + (out ? 0.5 : 0.0);
+    const double a = 2.0 * M_PI * turns;
+    ring.emplace_back(Eigen::Vector3d(r * std::cos(a), r * std::sin(a), 0).cast<float>());
+  }
+  return ring;
+}
+
+double twice_area_m2(const Vector3f& a, const Vector3f& b, const Vector3f& c) {
+  const Eigen::Vector3d from = a.cast<double>();
+  return (b.cast<double>() - from).cross(c.cast<double>() - from).z();
+}
+
+TEST(ObjFile, CoversASpiralOfAsManyCornersAsAFaceMayHave) {
+  const std::vector<Vector3f> ring = spiral(ObjLines::kMostCornersOfAFace);
+  double want_m2 = 0;  // by Gauss's formula
+  for (std::size_t i = 0; i < ring.size(); ++i)
+    want_m2 += 0.5 * twice_area_m2(Vector3f::Zero(), ring[i], ring[(i + 1) % ring.size()]);
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+  EXPECT_TRUE(cut_polygon(ring, triangles));
+  ASSERT_EQ(triangles.size(), ring.size() - 2);
+  double sum_m2 = 0;
+  for (const auto& [a, b, c] : triangles) {
+    const double one_m2 = 0.5 * twice_area_m2(ring[a], ring[b], ring[c]);
+    EXPECT_GE(one_m2 * want_m2, 0.0);  // each runs as the face does
+    sum_m2 += one_m2;
+  }
+  EXPECT_NEAR(sum_m2, want_m2, 1e-9 * std::abs(want_m2));
+}
+
+TEST(ObjFile, PassesOverACornerAtThePlaceOfTheNext) {
+  // How some exporters pad a triangle to a quad: taken as it is, no diagonal of it lies inside.
+  for (const char* face : {"f 1 2 3 3\n", "f 1 1 2 3\n", "f 1 2 2 3\n", "f 1 2 3 1\n",
+                           "f 1 1 2 2 3 3 3\n", "v 1 1 0\nf 1 2 3 5\n"}) {
+    const LoadedObj padded = load_obj(kSquare + face);
+    EXPECT_EQ(padded.report.tangled.count + padded.report.left_out(), 0U) << face;
+    EXPECT_EQ(padded.mesh().triangles.size(), 1U) << face;
+    EXPECT_DOUBLE_EQ(padded.report.area_m2, 0.5) << face;
+  }
+}
+
 TEST(ObjFile, TellsAFaceThatCrossesItself) {
   const LoadedObj loaded = load_obj(kSquare + "f 1 3 2 4\n");
   EXPECT_EQ(loaded.report.tangled.count, 1U);
@@ -119,6 +168,14 @@ TEST(ObjFile, TakesEverySortOfLineEnd) {
   EXPECT_DOUBLE_EQ(load_obj("\xEF\xBB\xBF" + kSquare + "f 1 2 3 4 \\").report.area_m2, 1.0);
 }
 
+TEST(ObjFile, EndsACommentWithItsLine) {
+  const LoadedObj loaded = load_obj("# from C:\\models\\\n" + kSquare +
+                                    "f 1 2 3 # D:\\\nf 1 \\\n 3 \\\n4 # E:\\\nf 1 2 4\n");
+  EXPECT_EQ(loaded.report.vertices, 4U);
+  EXPECT_EQ(loaded.report.faces, 3U);
+  EXPECT_EQ(loaded.mesh().triangles.size(), 3U);
+}
+
 TEST(ObjFile, KeepsTheOrderOfCornersAndTheNumbers) {
   const LoadedObj loaded = load_obj("v 0 0 0\nv +2.5e-1 0. -.0\nv 0 0 -2.5E+00 1.0\nf 1 2 3\n");
   ASSERT_EQ(loaded.mesh().triangles.size(), 1U);
@@ -154,7 +211,7 @@ TEST(ObjFile, NamesGroupsAndMaterialsWithoutALibrary) {
   EXPECT_EQ(loaded.group(3), "The Bus");
   EXPECT_EQ(loaded.material(3), "glass");
   EXPECT_EQ(loaded.grouped.group_names.size(), 3U);
-  EXPECT_EQ(loaded.grouped.part(1).triangles.size(), 2U);
+  EXPECT_EQ(loaded.grouped.part({false, true, false}).triangles.size(), 2U);
 }
 
 TEST(ObjFile, AsksForNoMaterialThatNoFaceIsOf) {
