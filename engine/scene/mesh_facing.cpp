@@ -52,12 +52,15 @@ bool faces_inwards_in_the_file(const Solid& solid) noexcept {
          (solid.unturned_m2 == 0.0 && solid.volume_m3 > 0.0);
 }
 
-/// Those that others may be in, the largest first.
+/// Those that others may be in, the largest first. Not those that are inside out in the file: there
+/// it has lost its way, and what faces inwards in them says nothing of a cavity.
 std::vector<Solid> hulls_of(const std::vector<Piece>& pieces, const std::vector<Solid>& solids) {
   constexpr std::size_t kEnough = 64;
   std::vector<Solid> hulls;
   for (std::size_t i = 0; i < pieces.size(); ++i)
-    if (pieces[i].closed && pieces[i].two_sided && !is_flat(solids[i])) hulls.push_back(solids[i]);
+    if (pieces[i].closed && pieces[i].two_sided && !is_flat(solids[i]) &&
+        !faces_inwards_in_the_file(solids[i]))
+      hulls.push_back(solids[i]);
   std::ranges::stable_sort(hulls, [](const Solid& a, const Solid& b) {
     return std::abs(a.volume_m3) > std::abs(b.volume_m3);
   });

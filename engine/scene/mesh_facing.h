@@ -17,7 +17,7 @@ struct Facing {
 
 /// A closed piece faces outwards, by the sign of its volume; an open one as most of its area does;
 /// one with a single side stays. A closed piece that faces inwards all over, within the box of a
-/// larger one, stays too: it may be the wall of a cavity.
+/// larger one that does not, stays too: it may be the wall of a cavity.
 [[nodiscard]] Facing facing_of(const Mesh& mesh, const MeshTopology& topology);
 
 }  // namespace engine

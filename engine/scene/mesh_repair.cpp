@@ -4,6 +4,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <iterator>
 #include <limits>
 
 #include <Eigen/Geometry>
@@ -59,11 +60,14 @@ class Repair {
     for (Vector3f& v : mesh_.vertices)
       if (!v.allFinite() || v.cwiseAbs().maxCoeff() >= kLargestCoordinate_m)
         v.setConstant(std::numeric_limits<float>::quiet_NaN());
-    leave_out(report_.not_finite, [this](std::size_t t) {
-      return std::ranges::any_of(mesh_.triangles[t].corner, [this](std::uint32_t corner) {
+    std::vector<bool> wrong(mesh_.triangles.size());
+    for (std::size_t t = 0; t < wrong.size(); ++t)
+      wrong[t] = std::ranges::any_of(mesh_.triangles[t].corner, [this](std::uint32_t corner) {
         return !mesh_.vertices[corner].allFinite();
       });
-    });
+    spread_over_faces(wrong);
+    count_faces(report_.not_finite, wrong);
+    leave_out(wrong);
   }
 
   void weld() {
@@ -74,7 +78,7 @@ class Repair {
       if (first[i] != i) ++report_.welded;
     for (Mesh::Triangle& t : mesh_.triangles)
       for (std::uint32_t& corner : t.corner) corner = first[corner];
-    leave_out(report_.zero_area, [this](std::size_t t) {
+    leave_out_flat([this](std::size_t t) {
       const auto& [a, b, c] = mesh_.triangles[t].corner;
       return a == b || b == c || c == a;
     });
@@ -83,22 +87,29 @@ class Repair {
   void drop_duplicates() {
     std::vector<std::uint32_t> chains(std::bit_ceil(mesh_.triangles.size() + 1), kNone);
     std::vector<std::uint32_t> next(mesh_.triangles.size(), kNone);
-    leave_out(report_.duplicate, [&](std::size_t t) {
+    std::vector<bool> wrong(mesh_.triangles.size(), false);
+    std::vector<bool> of_other_material(mesh_.triangles.size(), false);
+    for (std::uint32_t t = 0; t < wrong.size(); ++t) {
       const auto corners = sorted_corners(t);
       std::uint64_t hash = 0;
       for (const std::uint32_t corner : corners)
         hash = ((hash ^ corner) * 0x9E3779B97F4A7C15U) ^ (hash >> 29);
       std::uint32_t& chain = chains[(hash ^ hash >> 32) & (chains.size() - 1)];
-      for (std::uint32_t i = chain; i != kNone; i = next[i]) {
-        if (sorted_corners(i) != corners) continue;
-        if (mesh_.triangles[i].material != mesh_.triangles[t].material)
-          ++report_.duplicate_of_other_material;
-        return true;
+      std::uint32_t first = chain;
+      while (first != kNone && sorted_corners(first) != corners) first = next[first];
+      wrong[t] = first != kNone;
+      if (wrong[t]) {
+        of_other_material[t] = mesh_.triangles[first].material != mesh_.triangles[t].material;
+      } else {
+        next[t] = chain;
+        chain = t;
       }
-      next[t] = chain;
-      chain = static_cast<std::uint32_t>(t);
-      return false;
-    });
+    }
+    count_faces(report_.duplicate, wrong);
+    MeshDefect other_material;
+    count_faces(other_material, of_other_material);
+    report_.duplicate_of_other_material = other_material.count;
+    leave_out(wrong);
   }
 
   void face_alike() {
@@ -115,10 +126,12 @@ class Repair {
   }
 
   void drop_flat() {
-    leave_out(report_.zero_area, [this](std::size_t t) {
+    leave_out_flat([this](std::size_t t) {
       const auto [area_m2, longest_m] = area_and_longest(t);
       return !(2.0 * area_m2 > longest_m * report_.weld_m);
     });
+    std::ranges::sort(flat_lines_);
+    tell_lines(report_.zero_area, flat_lines_);
     for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) {
       const auto [area_m2, longest_m] = area_and_longest(t);
       report_.area_m2 += area_m2;
@@ -167,22 +180,35 @@ class Repair {
     return {0.5 * ab.cross(ac).norm(), std::sqrt(longest2_m2)};
   }
 
-  /// Triangles of one face have one line and stand together: they count once.
+  /// Triangles of one face have one line, which is no other's, and stand together: they count once.
+  static void tell_lines(MeshDefect& defect, const std::vector<std::uint32_t>& lines) {
+    for (std::size_t i = 0; i < lines.size(); ++i)
+      if (i == 0 || lines[i] == 0 || lines[i] != lines[i - 1]) defect.add(lines[i]);
+  }
+  [[nodiscard]] std::vector<std::uint32_t> lines_of(const std::vector<bool>& wrong) const {
+    std::vector<std::uint32_t> lines;
+    for (std::size_t t = 0; t < wrong.size(); ++t)
+      if (wrong[t]) lines.push_back(line_[t]);
+    return lines;
+  }
   void count_faces(MeshDefect& defect, const std::vector<bool>& wrong) const {
-    std::uint32_t last_line = 0;
-    for (std::size_t t = 0; t < wrong.size(); ++t) {
-      if (!wrong[t]) continue;
-      if (line_[t] == 0 || line_[t] != last_line) defect.add(line_[t]);
-      last_line = line_[t];
+    tell_lines(defect, lines_of(wrong));
+  }
+
+  /// To the other triangles of the face that one is of.
+  void spread_over_faces(std::vector<bool>& wrong) const {
+    for (std::size_t t = 0; t < wrong.size();) {
+      std::size_t end = t + 1;
+      while (end < wrong.size() && line_[t] != 0 && line_[end] == line_[t]) ++end;
+      const auto from = wrong.begin() + static_cast<std::ptrdiff_t>(t);
+      const auto to = wrong.begin() + static_cast<std::ptrdiff_t>(end);
+      if (std::find(from, to, true) != to) std::fill(from, to, true);
+      t = end;
     }
   }
 
   /// Keeps the others, in their order.
-  template <class Wrong>
-  void leave_out(MeshDefect& defect, const Wrong& is_wrong) {
-    std::vector<bool> wrong(mesh_.triangles.size());
-    for (std::size_t t = 0; t < wrong.size(); ++t) wrong[t] = is_wrong(t);
-    count_faces(defect, wrong);
+  void leave_out(const std::vector<bool>& wrong) {
     std::size_t kept = 0;
     for (std::size_t t = 0; t < wrong.size(); ++t) {
       if (wrong[t]) continue;
@@ -193,6 +219,14 @@ class Repair {
     mesh_.triangles.resize(kept);
     grouped_.group.resize(kept);
     line_.resize(kept);
+  }
+
+  template <class Flat>
+  void leave_out_flat(const Flat& is_flat) {
+    std::vector<bool> wrong(mesh_.triangles.size());
+    for (std::size_t t = 0; t < wrong.size(); ++t) wrong[t] = is_flat(t);
+    std::ranges::copy(lines_of(wrong), std::back_inserter(flat_lines_));
+    leave_out(wrong);
   }
 
   void tell_edges(const MeshTopology& topology) {
@@ -233,6 +267,7 @@ class Repair {
   GroupedMesh& grouped_;
   Mesh& mesh_;
   std::vector<std::uint32_t> line_;
+  std::vector<std::uint32_t> flat_lines_;  ///< of triangles without area
   MeshReport& report_;
 };
 

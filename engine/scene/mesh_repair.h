@@ -12,18 +12,17 @@ namespace engine {
 /// and counts the rest. `line` is the file's, by triangle; empty for a mesh without a file.
 ///
 /// In this order:
-/// 1. Faces with a corner that is no number, or 1000 km away, are left out.
-/// 2. Vertices closer than a millionth of the mesh's size become one, the first: exporters write
-/// six
-///    digits, so corners that were one come out that far apart. On a body of 10 m that is some
-///    10 um, under half a foil. Size is the median distance from the median vertex: one stray
-///    corner far out does not weld all the others.
+/// 1. Faces with a corner that is no number, or 1000 km away, are left out as a whole.
+/// 2. Vertices closer than a millionth of the mesh's size become one, the first: of the six digits
+///    that exporters write, corners that were one come out that far apart. On a body of 10 m that
+///    is some 10 um, under half a foil. Size is the median distance from the median vertex: one
+///    stray corner far out does not weld all the others.
 /// 3. Faces on three corners that an earlier one has are left out, either side up: rays would meet
 ///    one or the other by chance.
 /// 4. In a piece (triangles joined by edges of two) all are turned to face alike: outwards where it
 ///    is closed, as most of its area does where it is open. A closed piece that is inside out
-///    within another's box is left: it may be the wall of a cavity. A piece with one side only is
-///    left.
+///    within the box of another that is not is left: it may be the wall of a cavity. A piece with
+///    one side only is left.
 /// 5. Triangles lower than the weld are left out: no ray meets them, and an intersector may go
 ///    wrong on them. Edges are counted before, as such a one may close a gap.
 /// 6. Vertices and materials that nothing uses any more go.

@@ -5,7 +5,7 @@
 namespace engine {
 namespace {
 
-/// "12 faces without area (lines 7, 9, 11, ...)"
+/// "12 open edges (lines 7, 9, 11, ...)"
 void tell(std::vector<std::string>& lines, const MeshDefect& defect, const std::string& what,
           const std::string& more = "") {
   if (defect.count == 0) return;
@@ -38,7 +38,7 @@ std::vector<std::string> MeshReport::repairs() const {
   std::vector<std::string> lines;
   tell(lines, few_corners, "faces of under three corners left out");
   tell(lines, not_finite, "faces with a corner that is no number left out");
-  tell(lines, zero_area, "faces without area left out");
+  tell(lines, zero_area, "faces left out, whole or in part, for want of area");
   tell(lines, duplicate, "faces on the corners of an earlier one left out",
        duplicate_of_other_material == 0 ? ""
                                         : ": " + std::to_string(duplicate_of_other_material) +

@@ -30,7 +30,7 @@ struct MeshReport {
   // Left out: the image has nothing to lose.
   MeshDefect few_corners;  ///< faces of one or two
   MeshDefect not_finite;   ///< faces with a corner that is no number, or 1000 km away
-  MeshDefect zero_area;    ///< faces, or triangles of one, lower than the weld
+  MeshDefect zero_area;    ///< faces of which a triangle or all are lower than the weld
   MeshDefect duplicate;    ///< faces on the corners of an earlier one, either side up
   std::size_t duplicate_of_other_material = 0;  ///< of these: the first face's material stays
 
@@ -49,15 +49,18 @@ struct MeshReport {
   std::size_t one_sided = 0;      ///< pieces that no side can be told of (a Moebius strip)
   static constexpr double kSliver = 1000.0;
 
-  // What is left.
-  std::size_t kept_vertices = 0;
-  std::size_t triangles = 0;
+  // How it hangs together, with those triangles lower than the weld that have three corners: such
+  // a one may close a gap. So `edges` is not that of the triangles that are left.
   std::size_t edges = 0;
   std::int64_t euler_characteristic = 0;  ///< vertices - edges + triangles: 2 for each ball
   std::size_t pieces = 0;                 ///< joined by edges of two faces
   std::size_t closed_pieces = 0;
-  double area_m2 = 0;
   double volume_m3 = 0;  ///< of closed pieces; where two overlap it counts twice
+
+  // What is left.
+  std::size_t kept_vertices = 0;
+  std::size_t triangles = 0;
+  double area_m2 = 0;
   Eigen::Vector3d low_m = Eigen::Vector3d::Zero();
   Eigen::Vector3d high_m = Eigen::Vector3d::Zero();
 
@@ -75,7 +78,9 @@ struct MeshReport {
   [[nodiscard]] std::size_t left_out() const noexcept {
     return few_corners.count + not_finite.count + zero_area.count + duplicate.count;
   }
-  [[nodiscard]] bool clean() const noexcept;  ///< nothing left out, mended, or open
+  /// Nothing left out, turned, open, or of too many faces. Welding does not count: most exporters
+  /// give each face corners of its own.
+  [[nodiscard]] bool clean() const noexcept;
   /// A line for each thing that was left out or mended; empty: none.
   [[nodiscard]] std::vector<std::string> repairs() const;
   /// A line for each thing that is only told.

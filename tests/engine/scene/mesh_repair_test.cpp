@@ -82,16 +82,38 @@ TEST(MeshRepair, TurnsABodyThatIsInsideOut) {
   EXPECT_DOUBLE_EQ(cube.report.volume_m3, 1.0);
 }
 
-TEST(MeshRepair, KeepsTheWallOfACavity) {
-  std::string text = kCube;
+/// Within the cube, half as wide.
+std::string small_corners() {
+  std::string text;
   for (const char* v : {"0 0 0", "1 0 0", "1 1 0", "0 1 0", "0 0 1", "1 0 1", "1 1 1", "0 1 1"}) {
     text += "v";
     for (int i = 0; i < 3; ++i) text += v[2 * i] == '0' ? " .25" : " .75";
     text += "\n";
   }
-  const LoadedObj hollow = load_obj(text +
-                                    "f -8 -7 -6 -5\nf -1 -2 -3 -4\nf -4 -3 -7 -8\nf -3 -2 -6 -7\n"
-                                    "f -2 -1 -5 -6\nf -1 -4 -8 -5\n");
+  return text;
+}
+/// Inwards, of the last eight corners.
+constexpr const char* kInwardFaces =
+    "f -8 -7 -6 -5\nf -1 -2 -3 -4\nf -4 -3 -7 -8\nf -3 -2 -6 -7\nf -2 -1 -5 -6\nf -1 -4 -8 -5\n";
+
+TEST(MeshRepair, TakesNothingForACavityInABodyThatIsInsideOut) {
+  const LoadedObj two =
+      load_obj(std::string(kCubeCorners) + kInwardFaces + small_corners() + kInwardFaces);
+  EXPECT_EQ(two.report.flipped.count, 12U);
+  EXPECT_DOUBLE_EQ(two.report.volume_m3, 1.0 + 0.125);
+}
+
+TEST(MeshRepair, KeepsTheWallOfACavityWhenAFaceOfTheHullIsFlipped) {
+  const LoadedObj hollow =
+      load_obj(std::string(kCubeCorners) +
+               "f 1 2 3 4\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n" +
+               small_corners() + kInwardFaces);
+  EXPECT_EQ(hollow.report.flipped.count, 1U);
+  EXPECT_DOUBLE_EQ(hollow.report.volume_m3, 1.0 - 0.125);
+}
+
+TEST(MeshRepair, KeepsTheWallOfACavity) {
+  const LoadedObj hollow = load_obj(kCube + small_corners() + kInwardFaces);
   EXPECT_EQ(hollow.report.flipped.count, 0U);
   EXPECT_EQ(hollow.report.pieces, 2U);
   EXPECT_DOUBLE_EQ(hollow.report.volume_m3, 1.0 - 0.125);
@@ -139,7 +161,7 @@ TEST(MeshRepair, ShowsTheSameImageWhenEveryFaceIsThereTwice) {
   // With corners of its own, other side up, from another corner on, in another material.
   const LoadedObj sheets = load_obj(kCube + "usemtl white\n" + kCubeCorners + "f 10 11 12 9\n");
   EXPECT_EQ(sheets.report.duplicate.count, 1U);
-  EXPECT_EQ(sheets.report.duplicate_of_other_material, 2U);
+  EXPECT_EQ(sheets.report.duplicate_of_other_material, 1U);
   EXPECT_EQ(sheets.mesh().material_names, std::vector<std::string>{"default"});
 }
 
@@ -157,6 +179,36 @@ TEST(MeshRepair, RendersTheGoodFaceAmongBadOnes) {
   EXPECT_EQ(bad.report.left_out(), 8U);
   EXPECT_EQ(bad.mesh().vertices.size(), 4U);
   EXPECT_EQ(image_of(bad.mesh()), image_of(good.mesh()));
+}
+
+TEST(MeshRepair, LeavesAFaceWithABadCornerOutAsAWhole) {
+  const std::string corners = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv nan 1 0\nv .5 1e7 0\nv .5 2 0\n";
+  for (const char* face : {"f 1 2 3 4\n", "f 3 4 1 2\n", "f 1 2 3 5\n", "f 1 2 3 6 4\n"}) {
+    const LoadedObj bad = load_obj(corners + face);
+    EXPECT_TRUE(bad.mesh().triangles.empty()) << face;
+    EXPECT_EQ(bad.report.not_finite.count, 1U) << face;
+    EXPECT_EQ(bad.report.tangled.count, 0U) << face;
+  }
+  // Its neighbour stays.
+  EXPECT_EQ(load_obj(corners + "f 1 2 3 4\nf 1 2 3 6\n").mesh().triangles.size(), 2U);
+}
+
+TEST(MeshRepair, CountsAFaceOnceHoweverItLosesItsTriangles) {
+  // Of a ribbon one triangle goes as its corners are welded, the other for its height.
+  const LoadedObj ribbon =
+      load_obj(kCube + "v .3 6e-7 0\nv .3 0 0\nv .9 3e-7 0\nv .6 8e-7 0\nf 9 10 11 12\n");
+  EXPECT_EQ(ribbon.report.zero_area.count, 1U);
+  EXPECT_EQ(ribbon.mesh().triangles.size(), 12U);
+}
+
+TEST(MeshRepair, CallsCleanACubeWhoseFacesHaveCornersOfTheirOwn) {
+  std::string text;
+  for (const char* face : {"f -5 -6 -7 -8", "f -4 -3 -2 -1", "f -8 -7 -3 -4", "f -7 -6 -2 -3",
+                           "f -6 -5 -1 -2", "f -5 -8 -4 -1"})
+    text += std::string(kCubeCorners) + face + "\n";
+  const LoadedObj split = load_obj(text);
+  EXPECT_EQ(split.report.welded, 40U);
+  EXPECT_TRUE(split.report.clean());
 }
 
 TEST(MeshRepair, MayComeOutEmpty) {
