@@ -570,6 +570,20 @@ TEST(StarloopMesh, TellsAndDrawsWhatIsWrongWithAFile) {
   EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), fs::directory_iterator()), 2);
 }
 
+TEST(StarloopMesh, DrawsAFileWithNamesThatAreNotUtf8AndTellsThePictureItWrote) {
+  const TemporaryFolder folder;
+  const std::string file = folder.path() / "wing.obj";
+  std::ofstream(file) << "v 0 0 0\nv 3 0 0\nv 3 2 0\ng Fl\xfcgel\nusemtl wei\xdf\nf 1 2 3\n";
+  const std::string picture = folder.path() / "wing";
+  const Outcome mesh = starloop({"mesh", file, "-o", picture});
+  ASSERT_EQ(mesh.exit_code, kGood) << mesh.err;
+  EXPECT_NE(mesh.out.find("picture    " + picture + ".png\n"), std::string::npos) << mesh.out;
+  EXPECT_GT(fs::file_size(picture + ".png"), 10'000U);
+  // What cannot be drawn leaves nothing either.
+  EXPECT_NE(starloop({"mesh", file, "-o", picture + ".nonsense"}).exit_code, kGood);
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), fs::directory_iterator()), 2);
+}
+
 TEST(StarloopMesh, RefusesWhatIsNoMesh) {
   EXPECT_EQ(starloop({"mesh", "/nowhere/a.obj"}).err,
             "starloop: /nowhere/a.obj: expected an OBJ mesh, found no file to read\n");

@@ -2,8 +2,11 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
-#include <map>
 #include <stdexcept>
+#include <string>
+#include <system_error>
+#include <utility>
+#include <vector>
 
 #include <Eigen/Geometry>
 #include <nlohmann/json.hpp>
@@ -128,7 +131,8 @@ void print_report(const std::string& name, const engine::GroupedMesh& grouped,
   print_lines("mended", r.repairs());
   print_lines("told", r.remarks());
   print_lines("warning", r.warnings);
-  if (r.clean()) std::printf("%-10s every edge is of two faces, nothing was left out\n", "clean");
+  if (r.clean())
+    std::printf("%-10s every edge is of two faces, nothing was left out or turned\n", "clean");
 }
 
 json views_json(const std::vector<MeshView>& views) {
@@ -148,17 +152,41 @@ json views_json(const std::vector<MeshView>& views) {
   return all;
 }
 
-/// The views and what is needed to label them lie beside the picture until it is drawn.
+/// Lies beside a picture until it is drawn, or cannot be.
+class HelperFile {
+ public:
+  explicit HelperFile(std::string path) : path_(std::move(path)) {}
+  ~HelperFile() {
+    std::error_code ignored;
+    std::filesystem::remove(path_, ignored);
+  }
+  HelperFile(const HelperFile&) = delete;
+  HelperFile& operator=(const HelperFile&) = delete;
+  [[nodiscard]] const std::string& path() const noexcept { return path_; }
+
+ private:
+  std::string path_;
+};
+
+/// Names of groups and materials are the file's, in whatever encoding.
+std::string text_of(const json& report, int indent) {
+  return report.dump(indent, ' ', false, json::error_handler_t::replace);
+}
+
+/// The picture's name: a PNG where none says what it is.
+std::string picture_name(const std::string& out) {
+  return std::filesystem::path(out).has_extension() ? out : out + ".png";
+}
+
 void draw(const std::string& out, json report, const engine::GroupedMesh& grouped,
           const engine::MeshReport& mesh_report) {
-  const std::string views_png = beside(out, "_views.png");
-  const std::string labels = beside(out, "_views.json");
-  report["views"] = views_json(draw_views(grouped.mesh, mesh_report, views_png));
+  const HelperFile views(beside(out, "_views.png"));
+  const HelperFile labels(beside(out, "_views.json"));
+  report["views"] = views_json(draw_views(grouped.mesh, mesh_report, views.path()));
   report["colours"] = kMaterialColours;
   bool drawn = false;
-  if (std::ofstream file(labels); file << report << std::flush)
-    drawn = run_plot_script("mesh.py", labels, out);
-  for (const std::string& helper : {views_png, labels}) std::filesystem::remove(helper);
+  if (std::ofstream file(labels.path()); file << text_of(report, -1) << std::flush)
+    drawn = run_plot_script("mesh.py", labels.path(), out);
   if (!drawn) throw std::runtime_error(out + " cannot be drawn: is python3-matplotlib there?");
 }
 
@@ -173,13 +201,14 @@ int report_mesh(const MeshOptions& options) {
   const engine::GroupedMesh grouped = engine::load_mesh(spec, report);
   const json as_json = report_json(spec.name, grouped, report);
   if (options.as_json) {
-    std::printf("%s\n", as_json.dump(2, ' ', false, json::error_handler_t::replace).c_str());
+    std::printf("%s\n", text_of(as_json, 2).c_str());
   } else {
     print_report(spec.name, grouped, report);
   }
   if (options.out.empty()) return kGood;
-  draw(options.out, as_json, grouped, report);
-  if (!options.as_json) std::printf("%-10s %s\n", "picture", options.out.c_str());
+  const std::string picture = picture_name(options.out);
+  draw(picture, as_json, grouped, report);
+  if (!options.as_json) std::printf("%-10s %s\n", "picture", picture.c_str());
   return kGood;
 }
 
