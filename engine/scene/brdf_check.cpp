@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <vector>
 
 #include "engine/core/constants.h"
 #include "engine/scene/hemisphere_integral.h"
@@ -52,26 +53,27 @@ void check_lobe(const Brdf& brdf, BrdfCheck& check) {
     if (out.z() > 0.1) even = std::min(even, brdf.eval(in, out));
     return 0.0;
   }));
-  // The lobe may be anywhere: fine steps all over.
-  Vector3d middle = Vector3d::Zero();
   const Vector3d mirror = mirrored(incident_direction(kIncidence_rad));
-  const auto of_lobe = [&](const auto& weight) {
-    return hemisphere_integral<256, 96>(cos_in, [&](const Vector3d& in, const Vector3d& out) {
-      const double excess = std::max(0.0, brdf.eval(in, out) - even);
-      return excess * weight(out);
-    });
+  const double cone = 1.0 - std::cos(kCone_rad);
+  // All of it, what is within the cone, and the middle's x and z.
+  const auto excess = [&](const Vector3d& in, const Vector3d& out) -> Eigen::Vector4d {
+    const double here = std::max(0.0, brdf.eval(in, out) - even);
+    const double inside = one_minus_cos(mirror, out) <= cone ? here : 0.0;
+    return {here, inside, here * out.x(), here * out.z()};
   };
-  const double all = of_lobe([](const auto&) { return 1.0; });
+  // Fine about the mirror direction, and about where a table has lobes besides.
+  const TabulatedBrdf* table = brdf.table();
+  const std::vector<Vector3d> aside =
+      table != nullptr ? table->lobes_aside(cos_in) : std::vector<Vector3d>{};
+  const Eigen::Vector4d lobe = aside.empty() ? hemisphere_integral<256, 96>(cos_in, excess)
+                                             : hemisphere_integral<256, 96>(cos_in, aside, excess);
+  const double all = lobe[0];
   if (!(all > kNoLobe * kPi * even)) {
     check.at_mirror = check.middle_off_mirror_deg = std::numeric_limits<double>::quiet_NaN();
     return;
   }
-  const double cone = 1.0 - std::cos(kCone_rad);
-  const double inside =
-      of_lobe([&](const Vector3d& out) { return one_minus_cos(mirror, out) <= cone ? 1.0 : 0.0; });
-  middle.x() = of_lobe([](const Vector3d& out) { return out.x(); });
-  middle.z() = of_lobe([](const Vector3d& out) { return out.z(); });
-  check.at_mirror = inside / all;
+  const Vector3d middle(lobe[2], 0.0, lobe[3]);
+  check.at_mirror = lobe[1] / all;
   const double dot = std::clamp(mirror.dot(middle.normalized()), -1.0, 1.0);
   check.middle_off_mirror_deg = std::acos(dot) / kDegree;
 }
@@ -100,7 +102,23 @@ double one_way_rms(double furthest_rad, const F& f) {
   return pairs > 0 ? std::sqrt(sum2 / pairs) : 0.0;
 }
 
+void check_aside(const BrdfGrid& grid, BrdfCheck& check) {
+  double brightest = 0;
+  for (std::size_t i = 0; i < grid.incidences(); ++i) {
+    const auto& aside = grid.lobe_aside(i);
+    if (!aside) continue;
+    const Vector3d in = incident_direction(grid.incidence_rad(i));
+    const Vector3d mirror = mirrored(in);
+    const double there = grid.at(in, *aside);
+    if (there <= brightest || there < 2.0 * grid.at(in, mirror)) continue;
+    brightest = there;
+    check.aside_at_deg = grid.incidence_rad(i) / kDegree;
+    check.aside_off_mirror_deg = std::acos(std::clamp(mirror.dot(*aside), -1.0, 1.0)) / kDegree;
+  }
+}
+
 void check_table(const BrdfGrid& grid, BrdfCheck& check) {
+  check_aside(grid, check);
   check.measured = true;
   check.left_right_rms = grid.left_right_rms();
   const std::size_t last = grid.incidences() - 1;
@@ -173,6 +191,9 @@ std::string brdf_note(const std::string& name, const BrdfCheck& check) {
   if (check.middle_off_mirror_deg > kOffMirror_deg)
     add(text("its lobe is not at the mirror: %.0f deg off it, %.0f %% within 15 deg",
              check.middle_off_mirror_deg, 100.0 * check.at_mirror));
+  else if (std::isfinite(check.aside_at_deg))
+    add(text("its brightest reading at %g deg of incidence is %.0f deg off the mirror",
+             check.aside_at_deg, check.aside_off_mirror_deg));
   if (check.one_way_rms > kOneWay)
     add(text("not reciprocal: %.0f %% rms", 100.0 * check.one_way_rms));
   if (check.measured) {

@@ -25,6 +25,10 @@ struct BrdfCheck {
   /// Of the same, how far its middle is from the mirror direction: tens of degrees for a wide lobe
   /// that the horizon cuts, 90 for one that looks back at its source.
   double middle_off_mirror_deg = 0;
+  /// Of a table, the incidence of the brightest reading that is over 10 deg off the mirror
+  /// direction and twice what goes there, and how far off; not a number without one.
+  double aside_at_deg = std::numeric_limits<double>::quiet_NaN();
+  double aside_off_mirror_deg = std::numeric_limits<double>::quiet_NaN();
   /// As in use, and as printed or measured: rms of (a - b) / (a + b) of a pair of directions
   /// both ways, over pairs within 70 deg of the normal, or within the table's incidences.
   double one_way_rms = 0;
@@ -38,7 +42,7 @@ struct BrdfCheck {
   double least_coverage = 1;  ///< BrdfGrid::coverage
   double left_right_rms = 0;  ///< BrdfGrid::left_right_rms
 };
-/// Takes some milliseconds.
+/// Takes some milliseconds; some tens of them for a table.
 [[nodiscard]] BrdfCheck check_brdf(const Brdf& brdf);
 
 /// The share of light from `cos_in` that eq 7 as printed, or the table as measured, sends anywhere.

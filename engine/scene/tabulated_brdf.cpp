@@ -33,9 +33,45 @@ double by_cosine(const Table& table, double cos_in) noexcept {
 
 TabulatedBrdf::TabulatedBrdf(std::shared_ptr<const BrdfGrid> grid, bool reciprocal)
     : grid_(std::move(grid)), reciprocal_(reciprocal) {
+  find_asides();
   tabulate_albedo();
   find_even_part();
   find_lobe();
+}
+
+void TabulatedBrdf::find_asides() {
+  for (std::size_t i = 0; i < grid_->incidences(); ++i) {
+    const auto& out = grid_->lobe_aside(i);
+    if (!out) continue;
+    const double theta_rad = grid_->incidence_rad(i);
+    asides_.push_back({theta_rad, *out});
+    const double sin_out = std::hypot(out->x(), out->y());
+    if (!reciprocal_ || !(sin_out > 0.0)) continue;
+    // The same path the other way, turned so that its light comes from x below 0.
+    const Vector3d back = incident_direction(theta_rad);
+    const double x = -(back.x() * out->x() + back.y() * out->y()) / sin_out;
+    const double y = std::abs(back.x() * out->y() - back.y() * out->x()) / sin_out;
+    asides_.push_back({std::atan2(sin_out, out->z()), {x, y, back.z()}});
+  }
+}
+
+std::vector<Vector3d> TabulatedBrdf::lobes_aside(double cos_in) const {
+  // Two incidences are interpolated, each both ways.
+  constexpr std::size_t kMost = 4;
+  const double theta_rad = std::acos(std::clamp(cos_in, 0.0, 1.0));
+  std::vector<Aside> nearest = asides_;
+  std::ranges::stable_sort(nearest, {},
+                           [&](const Aside& a) { return std::abs(a.theta_in_rad - theta_rad); });
+  nearest.resize(std::min(nearest.size(), kMost));
+  std::vector<Vector3d> lobes;
+  for (const Aside& a : nearest) {
+    const Vector3d out = grid_->carried(a.theta_in_rad, a.out, theta_rad);
+    constexpr double kSame = 1e-6;
+    if (std::ranges::none_of(lobes,
+                             [&](const Vector3d& l) { return one_minus_cos(l, out) < kSame; }))
+      lobes.push_back(out);
+  }
+  return lobes;
 }
 
 double TabulatedBrdf::unlimited(const Vector3d& in, const Vector3d& out) const noexcept {
@@ -63,29 +99,40 @@ double TabulatedBrdf::albedo_as_measured(double cos_in) const noexcept {
 }
 
 void TabulatedBrdf::tabulate_albedo() {
+  const auto integral = [&](double cos_in, const auto& f) {
+    if (asides_.empty()) return hemisphere_integral<96, 32>(cos_in, f);
+    return hemisphere_integral<96, 32>(cos_in, lobes_aside(cos_in), f);
+  };
   const auto tabulate = [&](const auto& f) {
     ByCosine table{};
     for (std::size_t a = 0; a < table.size(); ++a)
-      table[a] = static_cast<float>(
-          hemisphere_integral<96, 32>((static_cast<double>(a) + 0.5) / kAngles, f));
+      table[a] = static_cast<float>(integral((static_cast<double>(a) + 0.5) / kAngles, f));
     return table;
   };
   const auto as_measured = [this](const Vector3d& in, const Vector3d& out) {
     return unlimited(in, out);
   };
   albedo_ = measured_albedo_ = tabulate(as_measured);
-  // Nothing is tabulated nearer to the normal than 5 deg, and what holds there may be more.
-  const auto head_on = static_cast<float>(hemisphere_integral<96, 32>(1.0, as_measured));
-  measured_albedo_.back() = std::max(measured_albedo_.back(), head_on);
+  // Nothing is tabulated nearer to the normal than 5 deg, and what holds there may be more; nor
+  // right where a lobe off the mirror was measured, that fades between incidences.
+  const auto raise = [&](double cos_in) {
+    const auto most = static_cast<float>(integral(cos_in, as_measured));
+    const double cell = std::clamp(cos_in * kAngles - 0.5, 0.0, kAngles - 1.0);
+    for (const double side : {std::floor(cell), std::ceil(cell)}) {
+      float& there = measured_albedo_[static_cast<std::size_t>(side)];
+      there = std::max(there, most);
+    }
+  };
+  raise(1.0);
+  for (const Aside& a : asides_) raise(std::cos(a.theta_in_rad));
   limited_ = *std::ranges::max_element(measured_albedo_) > 1.0F;
   if (limited_)
     albedo_ = tabulate([this](const Vector3d& in, const Vector3d& out) { return eval(in, out); });
 }
 
-void TabulatedBrdf::find_even_part() {
+std::vector<double> TabulatedBrdf::sorted_values(const Vector3d& in) const {
   constexpr int kRings = 16;
   constexpr int kTurns = 64;
-  const Vector3d in = incident_direction(grid_->incidence_rad(0));
   std::vector<double> values;
   for (int ring = 0; ring < kRings; ++ring) {
     const double r2 = (ring + 0.5) / kRings;
@@ -97,10 +144,29 @@ void TabulatedBrdf::find_even_part() {
     }
   }
   std::ranges::sort(values);
-  even_per_sr_ = values[values.size() / 2];
-  const bool even = values.back() - values.front() <= kEven * even_per_sr_ &&
-                    eval(in, mirrored(in)) <= (1.0 + kEven) * even_per_sr_;
-  diffuse_albedo_ = std::min(kPi * even_per_sr_, albedo(in.z()));
+  return values;
+}
+
+void TabulatedBrdf::find_even_part() {
+  bool even = asides_.empty();
+  bool even_first = even;
+  double most_out = 0;
+  for (std::size_t i = 0; i < grid_->incidences(); ++i) {
+    const Vector3d in = incident_direction(grid_->incidence_rad(i));
+    const std::vector<double> values = sorted_values(in);
+    if (i == 0) {
+      even_per_sr_ = values[values.size() / 2];
+      diffuse_albedo_ = std::min(kPi * even_per_sr_, albedo(in.z()));
+    }
+    const double most = std::max(values.back(), eval(in, mirrored(in)));
+    even = even && values.back() - values.front() <= kEven * even_per_sr_ &&
+           std::abs(most / even_per_sr_ - 1.0) <= kEven;
+    if (i == 0) even_first = even;
+    const double stands_out = even_first ? excess(in, 0.0) : 0.0;
+    if (!(stands_out > most_out)) continue;
+    most_out = stands_out;
+    lobe_at_ = i;
+  }
   lobe_half_width_rad_ = even ? 0.0 : kShapeless_rad;
 }
 
@@ -119,11 +185,11 @@ double TabulatedBrdf::excess(const Vector3d& in, double x) const noexcept {
 
 void TabulatedBrdf::find_lobe() {
   if (lobe_half_width_rad_ == 0.0) return;
-  const Vector3d normal_most = incident_direction(grid_->incidence_rad(0));
-  const double half = 0.5 * excess(normal_most, 0.0);
+  const Vector3d in_lobe = incident_direction(grid_->incidence_rad(lobe_at_));
+  const double half = 0.5 * excess(in_lobe, 0.0);
   constexpr double kStep_rad = 2e-4;
   double width = 0;
-  while (half > 0.0 && width < kShapeless_rad && excess(normal_most, 1.0 - std::cos(width)) > half)
+  while (half > 0.0 && width < kShapeless_rad && excess(in_lobe, 1.0 - std::cos(width)) > half)
     width += kStep_rad;
   if (half > 0.0) lobe_half_width_rad_ = std::max(width, kStep_rad);
 

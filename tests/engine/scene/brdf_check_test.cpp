@@ -60,6 +60,25 @@ TEST(BrdfCheck, FindsALobeThatLooksBackAtItsSource) {
   EXPECT_NE(brdf_note("foil", check).find("its lobe is not at the mirror"), std::string::npos);
 }
 
+TEST(BrdfCheck, FindsTheShareOfANarrowLobeThatLooksBack) {
+  // A degree and a half wide and next to a lobe of 6 deg at the mirror with 16/3 of its light: of
+  // all 3/19 are back, and of the rest exp(-(15/6)^2/2) is beyond 15 deg.
+  const Brdf two = table_of(scanned({45, 60}, [](const Vector3d& in, const Vector3d& out) {
+    const Vector3d mirror(-in.x(), -in.y(), in.z());
+    const double s2 = 2.0 * std::pow(1.5 * kDegree, 2);
+    return 0.05 + std::exp(-(mirror - out).squaredNorm() / (16.0 * s2)) +
+           3.0 * std::exp(-(in - out).squaredNorm() / s2);
+  }));
+  const BrdfCheck check = check_brdf(two);
+  EXPECT_NEAR(check.at_mirror, 16.0 / 19.0 * (1.0 - std::exp(-3.125)), 0.03);
+  EXPECT_EQ(check.aside_at_deg, 45.0);
+  EXPECT_NEAR(check.aside_off_mirror_deg, 90.0, 1e-6);
+  EXPECT_NE(brdf_note("tape", check)
+                .find("its brightest reading at 45 deg of incidence is 90 deg off the mirror"),
+            std::string::npos)
+      << brdf_note("tape", check);
+}
+
 TEST(BrdfCheck, PhysicalIsReciprocalAndPrintedIsNot) {
   const BrdfCheck physical = check_brdf(brdf_of("silicon", Variant::kPhysical));
   EXPECT_LT(physical.one_way_rms, 1e-12);
