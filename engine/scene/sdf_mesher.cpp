@@ -313,6 +313,7 @@ SdfMesh Mesher::run() && {
   SdfMethod method = spec_.method;
   if (method == SdfMethod::kAuto) method = known_edges() ? SdfMethod::kFront : SdfMethod::kTruss;
   if (method == SdfMethod::kTruss) try_truss();
+  if (!spec_.fall_back && method == SdfMethod::kTruss) return std::move(out_);
   // A front can do what a truss cannot, where it has edges to start from.
   const std::string truss_failed = std::move(out_.fell_back);
   out_.fell_back.clear();

@@ -51,6 +51,7 @@ struct SdfMeshSpec {
   int most_iterations = 300;
   std::size_t most_triangles = 400'000;
   std::uint64_t seed = 1;
+  bool fall_back = true;  ///< false: what failed is kept, to be looked at
 };
 [[nodiscard]] SdfMeshSpec even_edges(double edge_m, SdfMethod method = SdfMethod::kAuto);
 

@@ -13,6 +13,8 @@
 #include "engine/orbit/sun_track.h"
 #include "engine/scene/mesh_repair.h"
 #include "engine/scene/obj_file.h"
+#include "engine/scene/sdf/delaunay.h"
+#include "engine/scene/sdf_mesher.h"
 #include "tools/starloop/rig.h"
 #include "tools/starloop/scenario.h"
 
@@ -525,6 +527,32 @@ void bench_usb_frame(benchmark::State& state) {
   for (auto _ : state) benchmark::DoNotOptimize(drivers::encode_usb_frame(frame, format, bytes));
 }
 BENCHMARK(bench_usb_frame)->ArgName("packed")->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond);
+
+SdfShape square() { return region_of({{{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}}}); }
+
+// What meshing costs in triangulations: a truss makes some twenty, a front none.
+void bench_delaunay(benchmark::State& state) {
+  const SdfMesh mesh = mesh_shape(square(), even_edges(0.05, SdfMethod::kTruss));
+  for (auto _ : state) benchmark::DoNotOptimize(delaunay(mesh.places_m));
+  state.counters["triangles"] = static_cast<double>(mesh.triangles.size());
+}
+BENCHMARK(bench_delaunay)->Unit(benchmark::kMillisecond);
+
+void bench_meshing(benchmark::State& state, const SdfShape& shape, SdfMethod method,
+                   double edge_m) {
+  std::size_t triangles = 0;
+  for (auto _ : state) triangles = mesh_shape(shape, even_edges(edge_m, method)).triangles.size();
+  state.counters["triangles"] = static_cast<double>(triangles);
+}
+BENCHMARK_CAPTURE(bench_meshing, square_truss, square(), SdfMethod::kTruss, 0.05)
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(bench_meshing, square_front, square(), SdfMethod::kFront, 0.05)
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(bench_meshing, cube_front, surface_of(Solid::box({2, 2, 2})), SdfMethod::kFront,
+                  0.1)
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(bench_meshing, sphere_truss, surface_of(Solid::sphere(1)), SdfMethod::kAuto, 0.1)
+    ->Unit(benchmark::kMillisecond);
 
 }  // namespace
 

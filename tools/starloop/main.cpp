@@ -178,6 +178,16 @@ int run_command(int argc, char** argv) {
   fit_app->add_option("-o,--out", fit.out, "folder that gets fit.csv, material.toml and fit.png");
   fit_app->add_flag("-q,--quiet", fit.quiet, "print the block to paste, and complaints");
 
+  starloop::ShapesOptions shapes;
+  CLI::App* shapes_app = app.add_subcommand(
+      "shapes",
+      "Mesh a square, a sphere, a ring and a cube from their signed distances, and draw them");
+  shapes_app->add_option("--edge", shapes.edge_m, "length of edges, m, of bodies two metres across")
+      ->check(CLI::Range(0.02, 1.0))
+      ->capture_default_str();
+  shapes_app->add_option("-o,--out", shapes.out, "folder that gets meshes, figures and shapes.png")
+      ->capture_default_str();
+
   std::string bench_folder = "characterize";
   CLI::App* bench_app = app.add_subcommand(
       "characterize",
@@ -223,6 +233,7 @@ int run_command(int argc, char** argv) {
   if (stages_app->parsed()) return starloop::render_stages(common, stages);
   if (bench_app->parsed()) return starloop::characterize_camera(common, bench_folder);
   if (mesh_app->parsed()) return starloop::report_mesh(mesh);
+  if (shapes_app->parsed()) return starloop::mesh_shapes(shapes);
   if (links_app->parsed()) return starloop::list_links();
   if (passes_app->parsed()) return starloop::list_passes(common, passes);
   return starloop::render_frames(common, render);

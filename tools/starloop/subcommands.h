@@ -80,6 +80,15 @@ struct FitBrdfOptions {
 /// Fits the five-parameter model to measured points and says how well they know it.
 int fit_brdf(const FitBrdfOptions& options);
 
+struct ShapesOptions {
+  double edge_m = 0.16;  ///< of bodies two metres across
+  std::string out = "shapes";
+};
+/// Meshes a square, a sphere, a ring and a cube from their signed distances, as in figure 4 of Li
+/// et al. 2023, and the cube by the method that is not for it: an OBJ of each, their figures, one
+/// picture. `out` is a folder.
+int mesh_shapes(const ShapesOptions& shapes);
+
 /// Measures the scenario's camera on a bench, beside what the scenario says; `out` is a folder.
 int characterize_camera(const CommonOptions& options, const std::string& out);
 
