@@ -1,5 +1,6 @@
 #include "engine/core/config_reader.h"
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <optional>
@@ -87,13 +88,14 @@ struct ConfigReader::Document {
     return name + ":" + std::to_string(node->source().begin.line);
   }
 
-  void reject_unknown(const toml::table& table, const std::string& prefix) const {
+  void reject_unknown(const toml::table& table, const std::string& prefix,
+                      const std::string& what) const {
     for (const auto& [key, node] : table) {
       const std::string path = prefix + std::string(key.str());
       if (const auto* below = node.as_table()) {
-        reject_unknown(*below, path + ".");
+        reject_unknown(*below, path + ".", what);
       } else if (!asked.contains(path)) {
-        throw ConfigError(origin(path) + ": " + path + " is not a key of a scenario");
+        throw ConfigError(origin(path) + ": " + path + " is not a key of " + what);
       }
     }
   }
@@ -167,7 +169,21 @@ std::vector<std::string> ConfigReader::tables_below(const std::string& name) con
   return names;
 }
 
-void ConfigReader::reject_unknown_keys() const { document_->reject_unknown(document_->root, ""); }
+std::vector<std::string> ConfigReader::tables_in_order(const std::string& name) const {
+  std::vector<std::string> names = tables_below(name);
+  const auto* table = document_->root.at_path(name).as_table();
+  const auto line = [&](const std::string& key) {
+    const toml::source_position& at = table->get(key)->source().begin;
+    return std::pair(at.line, at.column);
+  };
+  std::stable_sort(names.begin(), names.end(),
+                   [&](const auto& a, const auto& b) { return line(a) < line(b); });
+  return names;
+}
+
+void ConfigReader::reject_unknown_keys(const std::string& what) const {
+  document_->reject_unknown(document_->root, "", what);
+}
 
 const std::string& ConfigReader::name() const noexcept { return document_->name; }
 
@@ -216,6 +232,34 @@ std::vector<double> ConfigTable::numbers(const std::string& key, std::size_t cou
     all.push_back(*value);
   }
   return all;
+}
+
+std::vector<std::vector<double>> ConfigTable::rows(const std::string& key, std::size_t columns,
+                                                   const Range& range) const {
+  const std::string wanted =
+      "must be a list of lists of " + std::to_string(columns) + " numbers, each " + range.text();
+  if (!has(key)) fail(key, "is missing: it " + wanted);
+  const toml::array* list = document_->find(path(key))->as_array();
+  if (list == nullptr) fail(key, wanted + ", got " + kind_text(*document_->find(path(key))));
+  std::vector<std::vector<double>> all;
+  for (const toml::node& row : *list) {
+    const toml::array* cells = row.as_array();
+    if (cells == nullptr || cells->size() != columns) fail(key, wanted);
+    std::vector<double>& numbers = all.emplace_back();
+    for (const toml::node& node : *cells) {
+      const auto value = number_in(node, range);
+      if (!value) fail(key, wanted + ", got in it " + kind_text(node));
+      numbers.push_back(*value);
+    }
+  }
+  return all;
+}
+
+std::vector<double> ConfigTable::numbers_or_none(const std::string& key, const Range& range) const {
+  if (!has(key)) return {};
+  const toml::array* list = document_->find(path(key))->as_array();
+  if (list == nullptr) fail(key, "must be a list of numbers, each " + range.text());
+  return numbers(key, list->size(), range);
 }
 
 double ConfigTable::number_or(const std::string& key, double fallback, const Range& range) const {

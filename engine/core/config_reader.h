@@ -71,8 +71,10 @@ class ConfigReader {
   [[nodiscard]] ConfigTable table(const std::string& name) const;
   /// The names of the tables directly below `name`, in alphabetical order.
   [[nodiscard]] std::vector<std::string> tables_below(const std::string& name) const;
-  /// Throws for the first key that no one has asked for.
-  void reject_unknown_keys() const;
+  /// The same in the order in which the file has them.
+  [[nodiscard]] std::vector<std::string> tables_in_order(const std::string& name) const;
+  /// Throws for the first key that no one has asked for: it is not one of `what`.
+  void reject_unknown_keys(const std::string& what = "a scenario") const;
 
   [[nodiscard]] const std::string& name() const noexcept;
 
@@ -98,6 +100,12 @@ class ConfigTable {
   /// A list of just so many numbers.
   [[nodiscard]] std::vector<double> numbers(const std::string& key, std::size_t count,
                                             const Range& range) const;
+  /// A list of lists, each of just so many numbers.
+  [[nodiscard]] std::vector<std::vector<double>> rows(const std::string& key, std::size_t columns,
+                                                      const Range& range) const;
+  /// Numbers, however many; empty when it is not there.
+  [[nodiscard]] std::vector<double> numbers_or_none(const std::string& key,
+                                                    const Range& range) const;
   /// A text, or a list of texts; empty when it is not there.
   [[nodiscard]] std::vector<std::string> texts(const std::string& key) const;
   /// What stands in a table whose keys are the user's own names, in alphabetical order.

@@ -8,6 +8,7 @@
 #include <Eigen/LU>
 
 #include "engine/core/contract.h"
+#include "engine/scene/described_target.h"
 #include "engine/scene/mesh_repair.h"
 #include "engine/scene/obj_file.h"
 #include "engine/scene/telescope.h"
@@ -27,12 +28,20 @@ double unit_m(const std::string& units) {
   throw ConfigError("units must be one of m, cm, mm, km, in, ft, got \"" + units + "\"");
 }
 
-bool is_built_in(const std::string& name) { return name == "telescope"; }
+bool is_built_in(const std::string& name) { return is_described_target(name); }
 
-GroupedMesh built_in(const std::string& name) {
+GroupedMesh built_in(const MeshSpec& spec, MeshReport& report) {
+  if (spec.name != "telescope") {
+    try {
+      return described_target(spec.name, &report.warnings);
+    } catch (const ConfigError& e) {
+      if (spec.where.empty()) throw;
+      throw ConfigError(spec.where + ": " + e.what());
+    }
+  }
   GroupedMesh grouped;
   grouped.mesh = telescope_mesh();
-  grouped.group_names = {name};
+  grouped.group_names = {spec.name};
   grouped.group.assign(grouped.mesh.triangles.size(), 0);
   return grouped;
 }
@@ -161,7 +170,7 @@ GroupedMesh load_mesh(const MeshSpec& spec, MeshReport& report) {
     if (spec.units != "m" || !spec.axes.isIdentity())
       throw ConfigError("units and axes are for a mesh from a file: \"" + spec.name +
                         "\" is in metres, body axes");
-    GroupedMesh grouped = built_in(spec.name);
+    GroupedMesh grouped = built_in(spec, report);
     GroupedMesh looked_at = grouped;
     report.vertices = grouped.mesh.vertices.size();
     report.faces = grouped.mesh.triangles.size();

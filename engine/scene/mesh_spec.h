@@ -16,7 +16,7 @@ namespace engine {
 /// Which mesh a body has, and how it becomes one in metres, in body axes, of the scenario's
 /// materials.
 struct MeshSpec {
-  std::string name = "telescope";  ///< built in, or the path of an OBJ file
+  std::string name = "telescope";  ///< built in, or the path of a description or an OBJ file
   std::string where;               ///< the place in the scenario that names it
   std::string units = "m";         ///< of the file
   /// Body coordinates from the file's: each row has one entry, 1 or -1; no mirror.

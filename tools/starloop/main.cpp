@@ -142,7 +142,10 @@ int run_command(int argc, char** argv) {
   starloop::MeshOptions mesh;
   CLI::App* mesh_app = app.add_subcommand(
       "mesh", "Tell what a mesh file is like, what a scenario would mend in it, and draw it");
-  mesh_app->add_option("mesh", mesh.file, "OBJ file, or a built-in mesh: telescope")->required();
+  mesh_app
+      ->add_option("mesh", mesh.file,
+                   "OBJ file, a target's description (.toml), or one built in: telescope")
+      ->required();
   mesh_app->add_option("--units", mesh.units, "of the file: m, cm, mm, km, in or ft")
       ->check(CLI::IsMember({"m", "cm", "mm", "km", "in", "ft"}))
       ->capture_default_str();

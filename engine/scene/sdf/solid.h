@@ -46,6 +46,8 @@ class Solid {
   [[nodiscard]] bool holds(const Eigen::Vector3d& p_m) const noexcept {
     return distance_m(p_m) < 0.0;
   }
+  /// Simple solids and operations together.
+  [[nodiscard]] std::size_t nodes() const noexcept { return nodes_.size(); }
   [[nodiscard]] std::size_t faces() const noexcept { return faces_.size(); }
   /// Of the whole smooth surface that a face is cut from; positive where it looks to, outwards.
   [[nodiscard]] double face_distance_m(std::size_t face, const Eigen::Vector3d& p_m) const noexcept;
