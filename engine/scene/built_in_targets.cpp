@@ -34,6 +34,7 @@ const std::array<Entry, 5> kTargets = {
 
 std::vector<std::string> built_in_targets() {
   std::vector<std::string> names;
+  names.reserve(kTargets.size());
   for (const Entry& entry : kTargets) names.emplace_back(entry.name);
   return names;
 }

@@ -11,7 +11,6 @@
 #include "engine/scene/described_target.h"
 #include "engine/scene/mesh_repair.h"
 #include "engine/scene/obj_file.h"
-#include "engine/scene/telescope.h"
 
 namespace engine {
 namespace {
@@ -31,19 +30,12 @@ double unit_m(const std::string& units) {
 bool is_built_in(const std::string& name) { return is_described_target(name); }
 
 GroupedMesh built_in(const MeshSpec& spec, MeshReport& report) {
-  if (spec.name != "telescope") {
-    try {
-      return described_target(spec.name, &report.warnings);
-    } catch (const ConfigError& e) {
-      if (spec.where.empty()) throw;
-      throw ConfigError(spec.where + ": " + e.what());
-    }
+  try {
+    return described_target(spec.name, &report.warnings);
+  } catch (const ConfigError& e) {
+    if (spec.where.empty()) throw;
+    throw ConfigError(spec.where + ": " + e.what());
   }
-  GroupedMesh grouped;
-  grouped.mesh = telescope_mesh();
-  grouped.group_names = {spec.name};
-  grouped.group.assign(grouped.mesh.triangles.size(), 0);
-  return grouped;
 }
 
 std::string number_text(double x) {
