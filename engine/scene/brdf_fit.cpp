@@ -24,6 +24,9 @@ using Matrix = BrdfFit::Correlation;
 constexpr std::size_t kLeastPoints = 12;
 // Off by more than this a parameter is not known.
 constexpr double kUndetermined = 0.5;
+// A model of so many sigmas stands clear of the noise. Not the reading: some are bright by chance.
+constexpr double kClear = 3.0;
+constexpr double kFurthestOff = 1e6;
 constexpr int kMostSteps = 200;
 constexpr int kMostWeighings = 50;
 constexpr std::size_t kStartsRefined = 4;
@@ -131,6 +134,7 @@ class Problem {
   bool minimise(Vector& u, const Compare& compare) const {
     double damping = 1e-3;
     Sums here = compare(u);
+    if (!std::isfinite(here.chi2)) return false;
     for (int step = 0; step < kMostSteps; ++step) {
       Matrix damped = here.jj;
       for (Eigen::Index i = 0; i < damped.rows(); ++i)
@@ -295,6 +299,7 @@ void state_uncertainty(const Problem& problem, const Sums& sums, bool have_sigma
   const Matrix covariance =
       (have_sigma ? std::max(1.0, scatter) : scatter) * covariance_of(problem, sums.jj);
   for (std::size_t i = 0; i < kFitParameters; ++i) {
+    if (!problem.is_free(i)) continue;
     const auto row = static_cast<Eigen::Index>(i);
     fit.sigma[i] =
         std::sqrt(covariance(row, row)) * std::abs(fit.value(static_cast<FitParameter>(i)));
@@ -342,13 +347,17 @@ BrdfFit fit_brdf(const BrdfPoints& points, const BrdfFitSpec& spec) {
   state_uncertainty(problem, sums, points.have_sigma, fit);
   fit.model_per_sr.assign(points.points.size(), 0.0);
   double sum2 = 0;
+  std::size_t clear = 0;
   Vector unused;
   for (const Point& p : problem.points()) {
     const double model = p.model(fit.parameters, unused);
     fit.model_per_sr[p.index] = model;
-    sum2 += std::pow(p.value / model - 1.0, 2);
+    // Noise about nothing is no share of anything.
+    if (points.have_sigma && !(model > kClear * p.sigma)) continue;
+    sum2 += std::pow(std::min(std::abs(p.value / model - 1.0), kFurthestOff), 2);
+    ++clear;
   }
-  fit.relative_rms = std::sqrt(sum2 / static_cast<double>(fit.points));
+  if (clear > 0) fit.relative_rms = std::sqrt(sum2 / static_cast<double>(clear));
   return fit;
 }
 

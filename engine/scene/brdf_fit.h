@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string_view>
 #include <vector>
@@ -11,6 +12,17 @@
 #include "engine/scene/five_parameter_brdf.h"
 
 namespace engine {
+
+/// What is fitted, in the order of every list here.
+enum class FitParameter : std::uint8_t { kAr, kBr, kKb, kKd, kKr };
+inline constexpr std::size_t kFitParameters = 5;
+inline constexpr std::array<std::string_view, kFitParameters> kFitNames{"ar", "br", "kb", "kd",
+                                                                        "kr"};
+
+struct BrdfFitSpec {
+  FiveParameterBrdf::Variant variant = FiveParameterBrdf::Variant::kPhysical;
+  std::array<std::optional<double>, kFitParameters> fixed;  ///< by FitParameter
+};
 
 /// The five parameters that measured points ask for, and how well they know them.
 ///
@@ -25,26 +37,18 @@ namespace engine {
 /// Uncertainties are one standard deviation, from the curvature at the best fit and the scatter of
 /// the points about it: chi squared over the degrees of freedom; stated sigmas are scaled up by it,
 /// never down. They do not know of a surface that eq 7 cannot describe.
-enum class FitParameter : std::uint8_t { kAr, kBr, kKb, kKd, kKr };
-inline constexpr std::size_t kFitParameters = 5;
-inline constexpr std::array<std::string_view, kFitParameters> kFitNames{"ar", "br", "kb", "kd",
-                                                                        "kr"};
-
-struct BrdfFitSpec {
-  FiveParameterBrdf::Variant variant = FiveParameterBrdf::Variant::kPhysical;
-  std::array<std::optional<double>, kFitParameters> fixed;  ///< by FitParameter
-};
-
 struct BrdfFit {
   using Correlation = Eigen::Matrix<double, kFitParameters, kFitParameters>;
 
   FiveParameters parameters;
-  std::array<double, kFitParameters> sigma{};  ///< 0: was held
+  std::array<double, kFitParameters> sigma{};  ///< 0 of what was held
   Correlation correlation = Correlation::Identity();
   std::size_t points = 0;   ///< that count: not those on the horizon
   std::size_t degrees = 0;  ///< of freedom
   double reduced_chi2 = 0;  ///< without stated sigmas 1 by construction
-  double relative_rms = 0;  ///< of what points are off, as a share of the model
+  /// Of what points are off, as a share of the model: where it is above three stated sigmas, or of
+  /// all points without them. Finite; 0 when there are none.
+  double relative_rms = 0;
   bool converged = false;
   std::vector<double> model_per_sr;  ///< by point; 0 on the horizon
 

@@ -8,6 +8,18 @@
 
 namespace engine {
 
+/// How a direction of scatter is named: the two ways of BrdfPoints.
+enum class ScatterAngles : std::uint8_t { kPlanes, kPolar };
+
+struct BrdfPoint {
+  int line = 0;  ///< in the file, from 1
+  double theta_in_deg = 0;
+  double first_deg = 0;   ///< in_plane or theta_out
+  double second_deg = 0;  ///< out_of_plane or azimuth
+  double brdf_per_sr = 0;
+  double sigma_per_sr = 0;  ///< 0: the file does not say
+};
+
 /// Measured points of a BRDF, as a goniometer's file has them.
 ///
 /// A CSV file whose first line names the columns, in one of these ways, with or without the last:
@@ -22,17 +34,6 @@ namespace engine {
 /// theta_out_deg is counted from the normal, azimuth_deg round it: 0 forward, on the side of the
 /// mirror direction, 180 back (phi_s of ASTM E2387); -180 to 360.
 /// sigma_per_sr is one standard deviation of brdf_per_sr.
-enum class ScatterAngles : std::uint8_t { kPlanes, kPolar };
-
-struct BrdfPoint {
-  int line = 0;  ///< in the file, from 1
-  double theta_in_deg = 0;
-  double first_deg = 0;   ///< in_plane or theta_out
-  double second_deg = 0;  ///< out_of_plane or azimuth
-  double brdf_per_sr = 0;
-  double sigma_per_sr = 0;  ///< 0: the file does not say
-};
-
 struct BrdfPoints {
   std::string path;
   ScatterAngles angles = ScatterAngles::kPlanes;

@@ -33,9 +33,8 @@ struct FacetGeometry {
 
 /// Five-parameter model, eq 7 of Li et al. 2023. All vectors are unit, in a frame whose z is the
 /// normal. We differ from the print:
-///  - alpha and gamma are exchanged: gamma = angle(n, h) and alpha = angle(i, h), h the half
-///  vector.
-///    As printed both of its materials send the light back to its source.
+///  - alpha and gamma are exchanged: gamma = angle(n, h) and alpha = angle(i, h), where h is the
+///    half vector. As printed both of its materials send the light back to its source.
 ///  - `physical` (default): the diffuse term is the constant kd, a Lambert surface of albedo pi kd,
 ///    and the specular term is scaled, alike for both directions, so that the two together never
 ///    send back more than came in. Reciprocal. The printed kd/cos_i passes albedo 1 at 76 deg.

@@ -53,10 +53,10 @@ std::vector<Material> read_materials(const ConfigReader& config) {
       continue;
     }
     FiveParameters p;
-    p.kd = table.number("kd", between(0.0, 1.0 / kPi));
+    p.kd = table.number("kd", between(0.0, kMostKd));
     p.kb = table.number_or("kb", 0.0, at_least(0.0));
     p.ar = p.kb > 0.0 ? table.number("ar", positive()) : p.ar;
-    p.br = p.kb > 0.0 ? table.number("br", from_below(-1e6, 0.0)) : p.br;
+    p.br = p.kb > 0.0 ? table.number("br", from_below(kLeastBr, 0.0)) : p.br;
     p.kr = p.kb > 0.0 ? table.number("kr", positive()) : p.kr;
     const double wrinkle_deg = table.number_or("wrinkle_deg", 0.0, between(0.0, 30.0));
     materials.push_back({name, p, variant, wrinkle_deg * kDegree});

@@ -5,9 +5,15 @@
 #include <vector>
 
 #include "engine/core/config_reader.h"
+#include "engine/core/constants.h"
 #include "engine/scene/brdf.h"
 
 namespace engine {
+
+/// What a scenario takes of the parameters: a Lambert surface sends back all at most, and a lobe is
+/// not narrower than a table of it can be.
+inline constexpr double kMostKd = 1.0 / kPi;
+inline constexpr double kLeastBr = -1e6;
 
 /// A surface as the scenario describes it. The tables of its Brdf take a tenth of a second to make,
 /// so they are made when a scene is built, not when a scenario is read.

@@ -166,6 +166,27 @@ TEST(FitBrdf, LogarithmsOfReadingsWouldPullTheDiffuseTermDown) {
   EXPECT_NEAR(sum / 16.0, 0.0, 4.0 * 0.004);
 }
 
+TEST(FitBrdf, IsNotDoneWhenItsSumsAreNoNumbers) {
+  // All held and sigmas of next to nothing: no step, and a sum of squares beyond all numbers.
+  BrdfPoints points = bench(test_support::silicon(), Variant::kPhysical, {});
+  points.have_sigma = true;
+  for (BrdfPoint& p : points.points) p.sigma_per_sr = 1e-160;
+  const BrdfFit fit = fit_brdf(points, {Variant::kPhysical, {1.0, -100.0, 1.0, 0.1, 1.0}});
+  EXPECT_FALSE(fit.converged);
+  EXPECT_EQ(fit.sigma[0], 0.0);
+}
+
+TEST(FitBrdf, RelativeScatterIsOfReadingsThatAreLight) {
+  // A detector's noise of .1 all over is twice silicon's diffuse term: most readings are none but
+  // noise, off by twice the model rms. Where it is three sigmas they are off by a third at most.
+  const Noise noise{0.01, 0.1, true, 77};
+  const BrdfFit fit = fit_brdf(bench(test_support::silicon(), Variant::kPhysical, noise), {});
+  EXPECT_TRUE(std::isfinite(fit.relative_rms));
+  EXPECT_GT(fit.relative_rms, 0.0);
+  EXPECT_LT(fit.relative_rms, 1.0 / 3.0);
+  EXPECT_NEAR(fit.reduced_chi2, 1.0, 0.5);
+}
+
 TEST(FitBrdf, ComplainsOfTooLittle) {
   BrdfPoints points = bench(test_support::silicon(), Variant::kPhysical, {});
   BrdfPoints few = points;
