@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -11,6 +13,7 @@
 #include "engine/core/contract.h"
 #include "engine/scene/brdf.h"
 #include "engine/scene/brdf_fit.h"
+#include "engine/scene/material.h"
 #include "tools/starloop/plot_script.h"
 #include "tools/starloop/subcommands.h"
 
@@ -49,15 +52,51 @@ void hold(const std::string& assignment, engine::BrdfFitSpec& spec) {
 
 FitParameter parameter(std::size_t i) { return static_cast<FitParameter>(i); }
 
-std::string block(const FitBrdfOptions& options, const BrdfFit& fit) {
-  std::string text = "[materials." + options.name + "]";
+/// A key of TOML, in quotes where it needs them.
+std::string key_of(const std::string& name) {
+  const auto bare = [](unsigned char c) { return std::isalnum(c) != 0 || c == '_' || c == '-'; };
+  const auto never = [](unsigned char c) { return c < ' ' || c == 127; };
+  // Keys of scenarios are looked up by paths, in which these part names.
+  if (name.empty() || name.find_first_of(".[]") != std::string::npos ||
+      std::ranges::any_of(name, never))
+    throw engine::ConfigError("--name must be a name without . [ ] and control characters, got \"" +
+                              name + "\"");
+  if (std::ranges::all_of(name, bare)) return name;
+  std::string quoted = "\"";
+  for (const char c : name) {
+    if (c == '"' || c == '\\') quoted += '\\';
+    quoted += c;
+  }
+  return quoted + "\"";
+}
+
+/// Why a scenario would not take it; empty: it does.
+const char* refusal_of(FitParameter which, double value) {
+  if (which == FitParameter::kKd && value > engine::kMostKd)
+    return "; a scenario refuses it: above 1/pi it makes light";
+  if (which == FitParameter::kBr && value < engine::kLeastBr)
+    return "; a scenario refuses it: below -1e6";
+  if (which == FitParameter::kBr && !(value < 0.0)) return "; a scenario refuses it: not below 0";
+  return "";
+}
+
+/// As many digits as anyone can use, and more where rounding would make a scenario refuse it.
+std::string number_of(FitParameter which, double value) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%-12.6g", value);
+  if (*refusal_of(which, value) == '\0' && *refusal_of(which, std::strtod(text, nullptr)) != '\0')
+    std::snprintf(text, sizeof text, "%-12.16g", value);
+  return text;
+}
+
+std::string block(const FitBrdfOptions& options, const BrdfFit& fit,
+                  const engine::BrdfFitSpec& spec) {
+  std::string text = "[materials." + key_of(options.name) + "]";
   text += "   # by starloop fit-brdf, brdf.variant = \"" + options.variant + "\"\n";
   for (std::size_t i = 0; i < kFitParameters; ++i) {
     char line[100];
-    std::snprintf(line, sizeof line, "%s = %-12.6g", std::string(kFitNames[i]).c_str(),
-                  fit.value(parameter(i)));
-    text += line;
-    if (fit.sigma[i] == 0.0) {
+    text += std::string(kFitNames[i]) + " = " + number_of(parameter(i), fit.value(parameter(i)));
+    if (spec.fixed[i].has_value()) {
       text += "# held";
     } else if (fit.undetermined(parameter(i))) {
       text += "# not determined by these data";
@@ -65,6 +104,7 @@ std::string block(const FitBrdfOptions& options, const BrdfFit& fit) {
       std::snprintf(line, sizeof line, "# +- %.2g", fit.sigma[i]);
       text += line;
     }
+    text += refusal_of(parameter(i), fit.value(parameter(i)));
     text += "\n";
   }
   return text;
@@ -82,24 +122,36 @@ std::size_t limited_points(const BrdfPoints& points, const BrdfFit& fit, Variant
   return limited;
 }
 
-void tell(const BrdfPoints& points, const BrdfFit& fit, Variant variant) {
-  std::printf("%s: %zu points, off by %.2g %% rms of the model; eq 7, diffuse term %s\n",
-              points.path.c_str(), fit.points, 100.0 * fit.relative_rms,
-              variant == Variant::kPaper ? "kd/cos_i" : "kd");
-  if (points.have_sigma)
-    std::printf("chi squared %.2f of each of %zu degrees of freedom%s\n", fit.reduced_chi2,
-                fit.degrees,
+/// How far the points are off.
+void tell_scatter(const BrdfPoints& points, const BrdfFit& fit, Variant variant) {
+  const char* diffuse = variant == Variant::kPaper ? "kd/cos_i" : "kd";
+  const double off_percent = 100.0 * fit.relative_rms;
+  if (points.have_sigma) {
+    std::printf("%s: %zu points, chi squared %.3g of each of %zu degrees of freedom%s\n",
+                points.path.c_str(), fit.points, fit.reduced_chi2, fit.degrees,
                 fit.reduced_chi2 > kTooFar
                     ? ": stated sigmas are too small, or eq 7 does not describe this surface; "
                       "uncertainties are scaled up by its root"
                     : "");
+    std::printf(
+        "points are off by %.2g %% rms of the model where it is above three sigmas; eq 7, diffuse "
+        "term %s\n",
+        off_percent, diffuse);
+  } else {
+    std::printf("%s: %zu points, off by %.2g %% rms of the model; eq 7, diffuse term %s\n",
+                points.path.c_str(), fit.points, off_percent, diffuse);
+  }
   if (!points.have_sigma && fit.relative_rms > kFarOff)
     std::printf(
         "that is more than scatter: eq 7 may not describe this surface; the uncertainties "
         "do not know\n");
+}
+
+void tell(const BrdfPoints& points, const BrdfFit& fit, const engine::BrdfFitSpec& spec) {
+  tell_scatter(points, fit, spec.variant);
   if (!fit.converged) std::printf("the fit did not settle: do not trust it\n");
   for (std::size_t i = 0; i < kFitParameters; ++i) {
-    if (fit.sigma[i] == 0.0) continue;
+    if (spec.fixed[i].has_value()) continue;
     if (fit.undetermined(parameter(i)))
       std::printf("%s: not determined by these data; --fix it\n",
                   std::string(kFitNames[i]).c_str());
@@ -113,7 +165,7 @@ void tell(const BrdfPoints& points, const BrdfFit& fit, Variant variant) {
             std::string(kFitNames[k]).c_str(), std::string(kFitNames[i]).c_str(), together);
     }
   }
-  if (const std::size_t limited = limited_points(points, fit, variant); limited > 0)
+  if (const std::size_t limited = limited_points(points, fit, spec.variant); limited > 0)
     std::printf(
         "at %zu of the points the renderer stays below the fit: there it would send back "
         "more than comes in\n",
@@ -171,17 +223,18 @@ int fit_brdf(const FitBrdfOptions& options) {
   engine::BrdfFitSpec spec;
   spec.variant = options.variant == "paper" ? Variant::kPaper : Variant::kPhysical;
   for (const std::string& assignment : options.fixed) hold(assignment, spec);
+  static_cast<void>(key_of(options.name));  // complains before the work
   const BrdfPoints points = engine::read_brdf_points(options.samples);
   const BrdfFit fit = engine::fit_brdf(points, spec);
-  if (!options.quiet) tell(points, fit, spec.variant);
-  std::printf("%s", block(options, fit).c_str());
+  if (!options.quiet) tell(points, fit, spec);
+  std::printf("%s", block(options, fit, spec).c_str());
   if (options.out.empty()) return fit.converged ? kGood : kCriterionFailed;
   fs::create_directories(options.out);
   const fs::path folder = options.out;
   write_points((folder / "fit.csv").string(), points, fit);
   write_curves((folder / "fit_curves.csv").string(), points, fit, spec);
   std::ofstream toml(folder / "material.toml");
-  toml << block(options, fit);
+  toml << block(options, fit, spec);
   need_written(toml, (folder / "material.toml").string());
   const bool drawn = run_plot_script("fit_brdf.py", options.out);
   if (!options.quiet)

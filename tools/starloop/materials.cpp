@@ -52,6 +52,10 @@ void tell(const engine::Material& material, const Shown& s) {
         "  lobe %.2f deg of the half vector wide, %.1f %% of it within 15 deg of the mirror, its "
         "middle %.1f deg off\n",
         s.brdf.lobe_half_width_rad() / kDegree, 100.0 * c.at_mirror, c.middle_off_mirror_deg);
+  if (std::isfinite(c.aside_at_deg))
+    std::printf(
+        "  brightest reading that is not at the mirror: at %g deg of incidence, %.1f deg off\n",
+        c.aside_at_deg, c.aside_off_mirror_deg);
   if (material.shines()) {
     const char* as = c.measured ? "measured" : "printed";
     std::printf("  albedo above 1 as %s: %s, %.3g at most\n", as,
@@ -70,6 +74,17 @@ void tell(const engine::Material& material, const Shown& s) {
       100.0 * c.left_right_rms);
 }
 
+/// A field of CSV: names may hold anything.
+std::string field(const std::string& name) {
+  std::string quoted = "\"";
+  for (const char c : name) {
+    if (c == '"') quoted += '"';
+    quoted += c;
+  }
+  quoted += '"';
+  return name.find_first_of(",\"\r\n") == std::string::npos ? name : quoted;
+}
+
 void write_albedos(const std::string& path, const std::vector<Shown>& all) {
   std::ofstream csv(path);
   csv << "material,theta_in_deg,albedo,as_it_came\n";
@@ -77,7 +92,7 @@ void write_albedos(const std::string& path, const std::vector<Shown>& all) {
     for (int i = 0; i <= 179; ++i) {
       const double deg = 0.5 * i;
       const double cos_in = std::cos(deg * kDegree);
-      csv << s.name << ',' << deg << ',' << s.brdf.albedo(cos_in) << ','
+      csv << field(s.name) << ',' << deg << ',' << s.brdf.albedo(cos_in) << ','
           << engine::albedo_as_it_came(s.brdf, cos_in) << '\n';
     }
   }
@@ -94,7 +109,7 @@ void write_lobes(const std::string& path, const std::vector<Shown>& all) {
       for (int i = -178; i <= 178; ++i) angles_deg.insert(0.5 * i);
       for (int i = -100; i <= 100; ++i) angles_deg.insert(theta_deg + 0.05 * i);
       for (const double deg : angles_deg)
-        csv << s.name << ',' << theta_deg << ',' << deg << ','
+        csv << field(s.name) << ',' << theta_deg << ',' << deg << ','
             << s.brdf.eval(
                    engine::incident_direction(theta_deg * kDegree),
                    engine::scatter_direction(engine::ScatterAngles::kPlanes, deg * kDegree, 0.0))
