@@ -232,6 +232,24 @@ void bench_brdf_eval(benchmark::State& state) {
 }
 BENCHMARK(bench_brdf_eval)->ArgName("physical_paper")->Arg(0)->Arg(1);
 
+/// As above, of a table: 5 incidences, 2 deg apart in the plane and 5 deg out of it.
+void bench_brdf_table_eval(benchmark::State& state) {
+  const Brdf silicon({}, Brdf::Variant::kPhysical);
+  BrdfPoints points;
+  for (int theta = 0; theta <= 80; theta += 20)
+    for (int first = -88; first <= 88; first += 2)
+      for (int second = 0; second <= 85; second += 5) {
+        BrdfPoint p{1, 1.0 * theta, 1.0 * first, 1.0 * second};
+        p.brdf_per_sr = silicon.eval(incident_direction(p), scatter_direction(points.angles, p));
+        points.points.push_back(p);
+      }
+  const Brdf brdf(TabulatedBrdf(std::make_shared<BrdfGrid>(points), true));
+  const Eigen::Vector3d in = Eigen::Vector3d(0.3, 0.2, 0.8).normalized();
+  const Eigen::Vector3d out = Eigen::Vector3d(-0.3, -0.1, 0.8).normalized();
+  for (auto _ : state) benchmark::DoNotOptimize(brdf.eval(in, out));
+}
+BENCHMARK(bench_brdf_table_eval);
+
 void bench_poisson(benchmark::State& state) {
   const double mean = std::pow(10.0, static_cast<double>(state.range(0)));
   Draws draws(1, Stream::kShot, 0, 0);
