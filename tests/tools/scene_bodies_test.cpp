@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include <gtest/gtest.h>
+#include <starloop_test_paths.h>
 
 #include "tests/support/scenes.h"
 #include "tests/support/temporary_folder.h"
