@@ -8,8 +8,8 @@
 #include "engine/core/constants.h"
 #include "engine/orbit/kepler.h"
 #include "engine/orbit/utc.h"
-#include "engine/scene/material.h"
 #include "engine/scene/camera_geometry.h"
+#include "engine/scene/material.h"
 #include "engine/scene/mesh.h"
 #include "engine/scene/snapshot.h"
 
