@@ -68,8 +68,9 @@ TEST(Materials, AreDescribedAndDrawn) {
   EXPECT_NE(run.out.find("albedo above 1 as printed: from 81.5 deg on"), std::string::npos)
       << run.out;
   EXPECT_NE(run.out.find("black: Lambert"), std::string::npos);
-  EXPECT_EQ(program::content_of(out / "albedo.csv").substr(0, 42),
-            "material,theta_in_deg,albedo,as_it_came\nbl");
+  const std::string table = program::content_of(out / "albedo.csv");
+  EXPECT_TRUE(table.starts_with("material,theta_in_deg,albedo,as_it_came\n"));
+  EXPECT_NE(table.find("\nblack,0,0.0300"), std::string::npos) << table.substr(0, 500);
   expect_drawn(out / "materials.png");
 }
 
