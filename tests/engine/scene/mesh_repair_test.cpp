@@ -229,8 +229,8 @@ TEST(MeshRepair, WeldsWhatSixDigitsTookApart) {
     Mesh::Triangle own{{}, t.material};
     for (std::size_t k = 0; k < 3; ++k) {
       own.corner[k] = static_cast<std::uint32_t>(loose.mesh.vertices.size());
-      const auto shifted = cube.mesh.vertices[t.corner[k]].cast<double>() +
-                           Eigen::Vector3d(off(chance), off(chance), off(chance));
+      const Eigen::Vector3d shifted = cube.mesh.vertices[t.corner[k]].cast<double>() +
+                                      Eigen::Vector3d(off(chance), off(chance), off(chance));
       loose.mesh.vertices.emplace_back(shifted.cast<float>());
     }
     loose.mesh.triangles.push_back(own);
