@@ -68,6 +68,8 @@ TEST_F(SceneBodies, AreTakenApartByGroups) {
   EXPECT_EQ(bodies.others.parts[0].shape->mesh.triangles.size(), 2U);
   EXPECT_EQ(bodies.others.parts[0].shape->mesh.vertices.size(), 4U);
   EXPECT_EQ(bodies.triangles(), 8U);
+  // Not the scenario's others: its white paint must not make the Earth's light matter.
+  EXPECT_EQ(bodies.materials(), (std::set<std::string>{"polyimide", "silicon"}));
   // The hinge is the origin of the part's own axes.
   EXPECT_NEAR(static_cast<double>(bodies.others.parts[0].shape->mesh.vertices[0].x()), -1.2, 1e-6);
   EXPECT_NEAR(static_cast<double>(bodies.others.parts[0].shape->mesh.vertices[0].z()), -0.1, 1e-6);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <set>
 #include <thread>
 #include <utility>
 
@@ -29,9 +30,10 @@ std::string text_of(const engine::StarCatalogue& stars, const engine::CameraGeom
   return text;
 }
 
-/// What a surface does not send everywhere alike may shine.
+/// Of the materials that bodies have. What a surface does not send everywhere alike may shine.
 engine::EarthshineSensor earthshine_sensor(const engine::SensorNoise& noise,
-                                           const std::vector<engine::Material>& materials) {
+                                           const std::vector<engine::Material>& materials,
+                                           const std::set<std::string>& used) {
   engine::EarthshineSensor sensor;
   sensor.e_per_radiance = noise.e_per_radiance;
   sensor.dark_variance_e2 = noise.dark_variance_e2;
@@ -39,6 +41,7 @@ engine::EarthshineSensor earthshine_sensor(const engine::SensorNoise& noise,
   sensor.diffuse_albedo = 0;
   sensor.glossy_albedo = 0;
   for (const engine::Material& m : materials) {
+    if (!used.contains(m.name)) continue;
     sensor.diffuse_albedo = std::max(sensor.diffuse_albedo, m.diffuse_albedo());
     sensor.glossy_albedo = std::max(sensor.glossy_albedo, m.glossy_albedo());
   }
@@ -90,7 +93,6 @@ Rig::Stages Rig::make_stages(const Scenario& scenario) {
                   noise_e * noise_e, detector.full_well_e, optics.noise_blur_px()};
   render.clock = &hil::SteadyClock::stopwatch;
   engine::SceneSpec scene = scenario.scene;
-  scene.earthshine_sensor = earthshine_sensor(render.noise, scenario.materials);
   const std::vector<engine::Companion> companions = move_companions(scenario);
   const auto builder_with = [&](std::vector<engine::ArticulatedPart> parts) {
     return engine::SnapshotBuilder(scene, *camera_, *target_, companions, std::move(parts));
@@ -103,6 +105,7 @@ Rig::Stages Rig::make_stages(const Scenario& scenario) {
   const SceneBodies bodies = make_bodies(scenario, frozen ? &*frozen : nullptr);
   triangles_ = bodies.triangles();
   material_notes_ = bodies.material_notes();
+  scene.earthshine_sensor = earthshine_sensor(render.noise, scenario.materials, bodies.materials());
   if (render.mesh_level == engine::MeshLevelChoice::kAuto && bodies.others.empty())
     engine::add_mesh_levels(*bodies.target, scenario.materials, render);
   std::unique_ptr<engine::Starlight> stars;

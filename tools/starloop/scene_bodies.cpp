@@ -166,6 +166,15 @@ std::size_t SceneBodies::triangles() const {
   return sum;
 }
 
+std::set<std::string> SceneBodies::materials() const {
+  // Parts know no other materials than their bodies.
+  std::set<std::string> names(target->mesh.material_names.begin(),
+                              target->mesh.material_names.end());
+  for (const auto& companion : others.companions)
+    names.insert(companion->mesh.material_names.begin(), companion->mesh.material_names.end());
+  return names;
+}
+
 std::vector<std::string> SceneBodies::material_notes() const {
   std::map<std::string, std::string> by_name;
   // Parts know no other materials than their bodies.

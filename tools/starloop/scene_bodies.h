@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,8 @@ struct SceneBodies {
 
   /// Of all bodies, each for itself.
   [[nodiscard]] std::size_t triangles() const;
+  /// The names of those that any body has.
+  [[nodiscard]] std::set<std::string> materials() const;
   /// A line for each material that a user should know something about.
   [[nodiscard]] std::vector<std::string> material_notes() const;
 };
