@@ -23,6 +23,9 @@ class ImagingChain final : public SceneGenerator {
   FrameReport expose(const Shot& shot, Budget budget, DnImage& out,
                      TruthMask& mask) noexcept override;
 
+  /// Of the last frame: the light on the detector, free of noise.
+  [[nodiscard]] const IrradianceImage& light() const noexcept { return irradiance_; }
+
  private:
   [[nodiscard]] Duration now() const noexcept {
     return stopwatch_ != nullptr ? stopwatch_() : Duration{};

@@ -25,7 +25,8 @@ enum class Stream : std::uint32_t {
   kAttitude = 21,
   kFaults = 22,
   kMeshSeeds = 30,
-  kCrinkle = 31
+  kCrinkle = 31,
+  kCharts = 40
 };
 
 /// Random numbers as a function of (seed, stream, frame, place): same bits whatever the threads.

@@ -38,12 +38,16 @@ void read_vignetting(const ConfigTable& table, VignettingSpec& spec) {
   }
 }
 
-/// As many cells to a pixel's side as carry what the lens passes, three at least.
+/// As many cells to a pixel's side as carry what the lens passes, three at least; or as many as the
+/// scenario says, whatever the lens passes.
 void choose_grid(const ConfigTable& table, OpticsSpec& spec) {
   constexpr int kLeast = 3;
   constexpr int kMost = 8;
-  if (table.choice_or<bool>("grid", "fine", {{"fine", false}, {"paper-grid", true}})) {
-    spec.oversampling = 1;
+  const int given = table.choice_or<int>(
+      "grid", "fine",
+      {{"fine", 0}, {"paper-grid", 1}, {"2x2", 2}, {"3x3", 3}, {"4x4", 4}, {"6x6", 6}, {"8x8", 8}});
+  if (given > 0) {
+    spec.oversampling = given;
     return;
   }
   const CameraGeometry& camera = spec.camera;

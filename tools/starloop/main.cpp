@@ -199,6 +199,28 @@ int run_command(int argc, char** argv) {
   bench_app->add_option("--out", bench_folder, "folder that gets report, tables and pictures")
       ->capture_default_str();
 
+  starloop::ChartOptions chart;
+  CLI::App* chart_app = app.add_subcommand(
+      "chart", "Chart speed against accuracy: settings on scenes, against a converged reference");
+  chart_app->add_option("scenes", chart.scenes, "files and folders of scenes, as in config/scenes")
+      ->required()
+      ->check(CLI::ExistingPath);
+  bool quick = false;
+  chart_app->add_flag("--quick", quick,
+                      "the knobs that matter most, 12 mixtures, few frames; the default");
+  chart_app->add_flag("--full", chart.full, "all knobs, 64 mixtures, 100 frames each: takes hours")
+      ->excludes("--quick");
+  chart_app
+      ->add_option("--try", chart.tried,
+                   "a setting of your own, \"render.bounces=2 optics.grid=4x4\"; may be given many "
+                   "times")
+      ->allow_extra_args(false);
+  chart_app->add_flag("--no-sweep", chart.tried_alone, "only the standard and what --try says");
+  chart_app
+      ->add_option("-o,--out", chart.out, "folder that gets chart.csv, pictures and chart.html")
+      ->capture_default_str();
+  chart_app->add_flag("-q,--quiet", chart.quiet, "a line for each scene only");
+
   starloop::SoakOptions soak;
   CLI::App* soak_app = app.add_subcommand(
       "soak", "Fly a pass over and over; exit 1 when anything slips, grows or gets lost");
@@ -229,6 +251,7 @@ int run_command(int argc, char** argv) {
   if (materials_app->parsed()) return starloop::show_materials(common, materials_folder);
   if (fit_app->parsed()) return starloop::fit_brdf(fit);
   if (run_app->parsed()) return starloop::run_pass(common, run);
+  if (chart_app->parsed()) return starloop::chart_settings(chart);
   if (soak_app->parsed()) return starloop::soak(common, soak);
   if (replay_app->parsed()) return starloop::replay_log(replay);
   if (orbits_app->parsed()) return starloop::compare_orbits(common, orbits);

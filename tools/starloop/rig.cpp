@@ -76,11 +76,19 @@ Rig::Rig(const Scenario& scenario, int threads)
     generator_ = std::make_unique<PatternGenerator>(scenario.detector.bits);
     return;
   }
+  generator_ = std::make_unique<engine::ImagingChain>(make_chain(scenario));
+}
+
+engine::ImagingChain Rig::make_chain(const Scenario& scenario) {
   Stages stages = make_stages(scenario);
-  generator_ = std::make_unique<engine::ImagingChain>(
-      stages.scene, std::move(stages.renderer), std::move(stages.optics),
-      engine::Detector(scenario.detector, pool_, sensor_maps(scenario)), scenario.detector,
-      scenario.scene.camera, &hil::SteadyClock::stopwatch, std::move(stages.stars));
+  return {stages.scene,
+          std::move(stages.renderer),
+          std::move(stages.optics),
+          engine::Detector(scenario.detector, pool_, sensor_maps(scenario)),
+          scenario.detector,
+          scenario.scene.camera,
+          &hil::SteadyClock::stopwatch,
+          std::move(stages.stars)};
 }
 
 Rig::Stages Rig::make_stages(const Scenario& scenario) {

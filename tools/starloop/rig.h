@@ -30,6 +30,8 @@ class Rig {
   };
   /// For who looks between them, once. The rig outlives them.
   [[nodiscard]] Stages make_stages(const Scenario& scenario);
+  /// The whole of it, for who looks at the light behind a frame. The rig outlives it.
+  [[nodiscard]] engine::ImagingChain make_chain(const Scenario& scenario);
   [[nodiscard]] engine::WorkerPool& pool() noexcept { return pool_; }
 
   [[nodiscard]] engine::SceneGenerator& generator() noexcept { return *generator_; }

@@ -92,6 +92,18 @@ int mesh_shapes(const ShapesOptions& shapes);
 /// Measures the scenario's camera on a bench, beside what the scenario says; `out` is a folder.
 int characterize_camera(const CommonOptions& options, const std::string& out);
 
+struct ChartOptions {
+  std::vector<std::string> scenes;  ///< files, and folders of them: tools/chart/chart_scene.h
+  bool full = false;
+  std::vector<std::string> tried;  ///< settings of the user's own: "a.b=c d.e=f"
+  bool tried_alone = false;        ///< and no sweep
+  bool quiet = false;
+  std::string out = "chart";
+};
+/// Tries settings on scenes, how long a frame takes against how far its light is from a reference,
+/// and draws them; `out` is a folder.
+int chart_settings(const ChartOptions& options);
+
 struct RunOptions {
   bool open_loop = false;
   std::string out = "out";

@@ -107,6 +107,7 @@ TEST(ReadOptics, RefusesAVignettingThatLeavesNoLight) {
   EXPECT_THROW((void)read("vignetting_r2 = -8\nvignetting_r4 = 8\n"), ConfigError);
   EXPECT_THROW((void)read("veiling_glare = 0.6\n"), ConfigError);
   EXPECT_EQ(read("grid = \"paper-grid\"\n").oversampling, 1);
+  EXPECT_EQ(read("grid = \"6x6\"\n").oversampling, 6);
 }
 
 }  // namespace
