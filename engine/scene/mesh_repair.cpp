@@ -10,6 +10,7 @@
 #include <Eigen/Geometry>
 
 #include "engine/scene/mesh_facing.h"
+#include "engine/scene/mesh_junctions.h"
 #include "engine/scene/mesh_topology.h"
 #include "engine/scene/vertex_places.h"
 
@@ -115,6 +116,7 @@ class Repair {
   void face_alike() {
     const MeshTopology topology(mesh_);
     tell_edges(topology);
+    tell_junctions(topology);
     const Facing facing = facing_of(mesh_, topology);
     report_.pieces = topology.pieces().size();
     report_.closed_pieces = facing.closed_pieces;
@@ -249,6 +251,16 @@ class Repair {
     for (std::vector<std::uint32_t>& some : lines) std::ranges::sort(some);
     for (const std::uint32_t line : lines[0]) report_.non_manifold_edges.add(line);
     for (const std::uint32_t line : lines[1]) report_.open_edges.add(line);
+  }
+
+  void tell_junctions(const MeshTopology& topology) {
+    const MeshJunctions junctions = junctions_of(mesh_, topology, report_.weld_m);
+    report_.t_junctions_complete = junctions.complete;
+    std::vector<std::uint32_t> lines;
+    for (const MeshJunctions::Junction& junction : junctions.found)
+      lines.push_back(line_[junction.triangle]);
+    std::ranges::sort(lines);
+    for (const std::uint32_t line : lines) report_.t_junctions.add(line);
   }
 
   void drop_unused_materials() {

@@ -28,10 +28,10 @@ namespace engine {
 /// 6. Vertices and materials that nothing uses any more go.
 /// Order is kept in everything. A mesh that has nothing wrong comes out as it went in.
 ///
-/// Open and non-manifold edges and slivers are counted and left: a shell of sheets is as good a
-/// target as a solid, shading is two-sided.
-/// Leaves out: faces that overlap in a plane without the same corners; T-junctions; holes are not
-/// closed. Throws nothing; a mesh may come out empty.
+/// Open and non-manifold edges, vertices in the middle of another face's open edge, and slivers are
+/// counted and left: a shell of sheets is as good a target as a solid, shading is two-sided.
+/// Leaves out: faces that overlap in a plane without the same corners; holes are not closed. Throws
+/// nothing; a mesh may come out empty.
 void repair(GroupedMesh& grouped, std::vector<std::uint32_t> line, MeshReport& report);
 
 }  // namespace engine

@@ -58,6 +58,10 @@ std::vector<std::string> MeshReport::remarks() const {
   std::vector<std::string> lines;
   tell(lines, open_edges, "open edges");
   tell(lines, non_manifold_edges, "edges of more than two faces");
+  tell(lines, t_junctions, "vertices in the middle of another face's open edge");
+  if (!t_junctions_complete)
+    lines.emplace_back(
+        "too many open edges, or across one another, to find every vertex in the middle of one");
   tell(lines, slivers, "triangles over 1000 times as long as they are high");
   if (one_sided > 0) lines.push_back(std::to_string(one_sided) + " pieces with one side only");
   tell(lines, not_faces, "lines, points or curves, which have no surface");

@@ -43,10 +43,12 @@ struct MeshReport {
   // Told.
   MeshDefect open_edges;          ///< of one face only
   MeshDefect non_manifold_edges;  ///< of more than two
-  MeshDefect slivers;             ///< triangles kSliver times as long as they are high
-  MeshDefect not_faces;           ///< lines, points, curves: statements without a surface
-  MeshDefect unknown;             ///< statements that are none of an OBJ file
-  std::size_t one_sided = 0;      ///< pieces that no side can be told of (a Moebius strip)
+  MeshDefect t_junctions;         ///< vertices in the middle of another face's open edge: its line
+  bool t_junctions_complete = true;  ///< or there may be more: too many edges to look
+  MeshDefect slivers;                ///< triangles kSliver times as long as they are high
+  MeshDefect not_faces;              ///< lines, points, curves: statements without a surface
+  MeshDefect unknown;                ///< statements that are none of an OBJ file
+  std::size_t one_sided = 0;         ///< pieces that no side can be told of (a Moebius strip)
   static constexpr double kSliver = 1000.0;
 
   // How it hangs together, with those triangles lower than the weld that have three corners: such

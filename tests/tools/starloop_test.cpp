@@ -560,6 +560,7 @@ TEST(StarloopMesh, TellsAndDrawsWhatIsWrongWithAFile) {
   EXPECT_EQ(report.at("left_out").at("zero_area").at("first_lines"), nlohmann::json({16}));
   EXPECT_EQ(report.at("mended").at("flipped").at("first_lines"), nlohmann::json({12}));
   EXPECT_EQ(report.at("told").at("open_edges").at("count"), 4);
+  EXPECT_EQ(report.at("told").at("t_junctions").at("count"), 0);
   EXPECT_EQ(report.at("materials").at(0).at("name"), "foil");
   EXPECT_NEAR(report.at("area_m2").get<double>(), 16.0, 1e-5);
   EXPECT_NEAR(report.at("high_m").at(0).get<double>(), 1.0, 1e-6);

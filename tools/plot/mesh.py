@@ -92,6 +92,7 @@ def words(report):
         f"{mended['flipped']['count']} turned round, {mended['welded_vertices']} vertices welded",
         f"{told['open_edges']['count']} open edges, "
         f"{told['non_manifold_edges']['count']} of over two faces",
+        f"{told['t_junctions']['count']} vertices in the middle of an open edge",
     ])
 
 
