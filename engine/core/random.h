@@ -26,6 +26,7 @@ enum class Stream : std::uint32_t {
   kFaults = 22,
   kMeshSeeds = 30,
   kCrinkle = 31,
+  kMeshSides = 32,
   kCharts = 40
 };
 

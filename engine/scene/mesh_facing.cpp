@@ -5,6 +5,8 @@
 
 #include <Eigen/Geometry>
 
+#include "engine/scene/mesh_outside.h"
+
 namespace engine {
 namespace {
 
@@ -40,11 +42,17 @@ Solid solid_of(const Mesh& mesh, const Piece& piece) {
   return solid;
 }
 
+double area_m2(const Solid& solid) noexcept { return solid.turned_m2 + solid.unturned_m2; }
+
 /// Too flat for its volume to have a sign: two sheets back to back.
 bool is_flat(const Solid& solid) noexcept {
   constexpr double kRounding = 1e-9;
-  const double area_m2 = solid.turned_m2 + solid.unturned_m2;
-  return std::abs(solid.volume_m3) <= kRounding * area_m2 * std::sqrt(area_m2);
+  const double surface_m2 = area_m2(solid);
+  return std::abs(solid.volume_m3) <= kRounding * surface_m2 * std::sqrt(surface_m2);
+}
+
+bool is_solid(const Piece& piece, const Solid& solid) noexcept {
+  return piece.closed && !is_flat(solid);
 }
 
 bool faces_inwards_in_the_file(const Solid& solid) noexcept {
@@ -58,7 +66,7 @@ std::vector<Solid> hulls_of(const std::vector<Piece>& pieces, const std::vector<
   constexpr std::size_t kEnough = 64;
   std::vector<Solid> hulls;
   for (std::size_t i = 0; i < pieces.size(); ++i)
-    if (pieces[i].closed && pieces[i].two_sided && !is_flat(solids[i]) &&
+    if (pieces[i].two_sided && is_solid(pieces[i], solids[i]) &&
         !faces_inwards_in_the_file(solids[i]))
       hulls.push_back(solids[i]);
   std::ranges::stable_sort(hulls, [](const Solid& a, const Solid& b) {
@@ -75,6 +83,28 @@ bool may_be_cavity(const Solid& solid, const std::vector<Solid>& hulls) {
          });
 }
 
+/// By piece, those that are solid or have one side apart: kEither.
+std::vector<MeshOutside::Side> outsides_of(const Mesh& mesh, const std::vector<Piece>& pieces,
+                                           const std::vector<Solid>& solids) {
+  std::vector<MeshOutside::Side> sides(pieces.size(), MeshOutside::Side::kEither);
+  std::vector<std::size_t> open;
+  for (std::size_t i = 0; i < pieces.size(); ++i)
+    if (pieces[i].two_sided && !pieces[i].closed && area_m2(solids[i]) > 0.0) open.push_back(i);
+  if (open.empty()) return sides;
+  std::ranges::stable_sort(
+      open, [&](std::size_t a, std::size_t b) { return area_m2(solids[a]) > area_m2(solids[b]); });
+  MeshOutside outside(mesh);
+  for (const std::size_t i : open) sides[i] = outside.of(pieces[i]);
+  return sides;
+}
+
+/// Whether to turn round what goes with the first triangle.
+bool turns_first(const Piece& piece, const Solid& solid, MeshOutside::Side outside) noexcept {
+  if (is_solid(piece, solid)) return solid.volume_m3 < 0.0;
+  if (outside == MeshOutside::Side::kFirst) return false;
+  return outside == MeshOutside::Side::kOther || solid.turned_m2 > solid.unturned_m2;
+}
+
 }  // namespace
 
 Facing facing_of(const Mesh& mesh, const MeshTopology& topology) {
@@ -83,6 +113,7 @@ Facing facing_of(const Mesh& mesh, const MeshTopology& topology) {
   solids.reserve(pieces.size());
   for (const Piece& piece : pieces) solids.push_back(solid_of(mesh, piece));
   const std::vector<Solid> hulls = hulls_of(pieces, solids);
+  const std::vector<MeshOutside::Side> outsides = outsides_of(mesh, pieces, solids);
 
   Facing facing;
   facing.turn.assign(mesh.triangles.size(), false);
@@ -94,12 +125,12 @@ Facing facing_of(const Mesh& mesh, const MeshTopology& topology) {
       continue;
     }
     facing.closed_pieces += piece.closed ? 1 : 0;
-    const bool is_solid = piece.closed && !is_flat(solid);
-    const bool cavity = is_solid && may_be_cavity(solid, hulls);
-    if (is_solid)
+    facing.not_looked += outsides[i] == MeshOutside::Side::kGaveUp ? 1U : 0U;
+    const bool cavity = is_solid(piece, solid) && may_be_cavity(solid, hulls);
+    if (is_solid(piece, solid))
       facing.volume_m3 += cavity ? -std::abs(solid.volume_m3) : std::abs(solid.volume_m3);
     if (cavity) continue;
-    const bool turn_first = is_solid ? solid.volume_m3 < 0.0 : solid.turned_m2 > solid.unturned_m2;
+    const bool turn_first = turns_first(piece, solid, outsides[i]);
     for (std::size_t k = 0; k < piece.triangles.size(); ++k)
       facing.turn[piece.triangles[k]] = piece.against[k] != turn_first;
   }

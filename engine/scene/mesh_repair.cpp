@@ -121,6 +121,7 @@ class Repair {
     report_.pieces = topology.pieces().size();
     report_.closed_pieces = facing.closed_pieces;
     report_.one_sided = facing.one_sided;
+    report_.not_looked = facing.not_looked;
     report_.volume_m3 = facing.volume_m3;
     count_faces(report_.flipped, facing.turn);
     for (std::size_t t = 0; t < mesh_.triangles.size(); ++t)

@@ -20,7 +20,8 @@ namespace engine {
 /// 3. Faces on three corners that an earlier one has are left out, either side up: rays would meet
 ///    one or the other by chance.
 /// 4. In a piece (triangles joined by edges of two) all are turned to face alike: outwards where it
-///    is closed, as most of its area does where it is open. A closed piece that is inside out
+///    is closed, and where it is open to the side that sees more of the sky, or as most of its area
+///    does. A closed piece that is inside out
 ///    within the box of another that is not is left: it may be the wall of a cavity. A piece with
 ///    one side only is left.
 /// 5. Triangles lower than the weld are left out: no ray meets them, and an intersector may go

@@ -63,6 +63,9 @@ std::vector<std::string> MeshReport::remarks() const {
     lines.emplace_back(
         "too many open edges, or across one another, to find every vertex in the middle of one");
   tell(lines, slivers, "triangles over 1000 times as long as they are high");
+  if (not_looked > 0)
+    lines.push_back(std::to_string(not_looked) +
+                    " open pieces whose outside was not looked for: too many");
   if (one_sided > 0) lines.push_back(std::to_string(one_sided) + " pieces with one side only");
   tell(lines, not_faces, "lines, points or curves, which have no surface");
   tell(lines, unknown, "statements that an OBJ file does not have");

@@ -48,6 +48,7 @@ struct MeshReport {
   MeshDefect slivers;                ///< triangles kSliver times as long as they are high
   MeshDefect not_faces;              ///< lines, points, curves: statements without a surface
   MeshDefect unknown;                ///< statements that are none of an OBJ file
+  std::size_t not_looked = 0;        ///< open pieces that were not turned outwards: too many
   std::size_t one_sided = 0;         ///< pieces that no side can be told of (a Moebius strip)
   static constexpr double kSliver = 1000.0;
 
