@@ -1,12 +1,12 @@
 #include "engine/scene/articulated_part.h"
 
-#include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include <Eigen/Geometry>
 
 #include "engine/core/constants.h"
+#include "engine/scene/body_number.h"
 
 namespace engine {
 
@@ -62,13 +62,10 @@ std::optional<PartSpec::Limits> read_limits(const ConfigTable& table, const std:
   return PartSpec::Limits{v[0] * kDegree, v[1] * kDegree};
 }
 
-/// The number of a body by its name: the target's is 0.
-std::optional<std::size_t> body_named(const std::string& name,
-                                      const std::vector<CompanionSpec>& companions) {
-  if (name == "target") return 0;
-  const auto it = std::ranges::find(companions, name, &CompanionSpec::name);
-  if (it == companions.end()) return std::nullopt;
-  return static_cast<std::size_t>(it - companions.begin()) + 1;
+std::vector<std::string> names_of(const std::vector<CompanionSpec>& companions) {
+  std::vector<std::string> names;
+  for (const CompanionSpec& companion : companions) names.push_back(companion.name);
+  return names;
 }
 
 void read_follows(const ConfigTable& table, const std::vector<CompanionSpec>& companions,
@@ -84,7 +81,7 @@ void read_follows(const ConfigTable& table, const std::vector<CompanionSpec>& co
     spec.follows = PartFollows::kEarth;
   } else if (word == "camera") {
     spec.follows = PartFollows::kCamera;
-  } else if (const auto body = body_named(word, companions); !body) {
+  } else if (const auto body = body_number(word, names_of(companions)); !body) {
     table.fail("follows",
                "must be \"sun\", \"earth\", \"camera\", \"target\" or the name of a companion, "
                "got \"" +

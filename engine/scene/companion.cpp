@@ -1,6 +1,6 @@
 #include "engine/scene/companion.h"
 
-#include <algorithm>
+#include "engine/scene/body_number.h"
 
 namespace engine {
 namespace {
@@ -16,11 +16,10 @@ OrbitalOffset read_offset(const ConfigTable& table) {
 /// The number of a body by its name, as CompanionSpec::beside has it.
 std::size_t read_beside(const ConfigTable& table, const std::vector<std::string>& names) {
   const std::string name = table.text_or("beside", "target");
-  if (name == "target") return 0;
-  const auto it = std::ranges::find(names, name);
-  if (it == names.end())
+  const auto number = body_number(name, names);
+  if (!number)
     table.fail("beside", "must be \"target\" or the name of a companion, got \"" + name + "\"");
-  return static_cast<std::size_t>(it - names.begin()) + 1;
+  return *number;
 }
 
 CompanionSpec read_companion(const ConfigReader& config, const std::string& name,
