@@ -11,7 +11,7 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr int kPairs = 128;
-constexpr std::uint64_t kMostSteps = 60'000'000;  // looks at boxes, some 10 ns each
+constexpr std::uint64_t kMostSteps = 30'000'000;  // looks at boxes, some 20 ns each
 constexpr double kNearest =
     1e-6;  // of the piece's size: sheets that lie in one another hide nothing
 
