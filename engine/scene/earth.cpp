@@ -20,7 +20,7 @@ std::string_view name_of(AlbedoModel model) noexcept {
 
 EarthSpec read_earth(const ConfigTable& table) {
   EarthSpec spec;
-  spec.earthshine = table.choice_or<EarthshineModel>("earthshine", "vector",
+  spec.earthshine = table.choice_or<EarthshineModel>("earthshine", "auto",
                                                      {{"none", EarthshineModel::kNone},
                                                       {"paper-lamp", EarthshineModel::kPaperLamp},
                                                       {"vector", EarthshineModel::kVector},

@@ -30,7 +30,7 @@ std::vector<Knob> make_knobs() {
       knob_of("bounces", "render.bounces", {"0", "1", "2", "auto"}, 1),
       knob_of("sun disc", "render.sun_disc", {"off", "on", "auto"}, 2),
       knob_of("earthshine", "earth.earthshine",
-              {"none", "paper-lamp", "vector", "harmonics", "cap", "auto"}, 2),
+              {"none", "paper-lamp", "vector", "harmonics", "cap", "auto"}, 5),
       knob_of("far target", "render.far_target", {"point", "resolved", "auto"}, 2),
       knob_of("mesh level", "render.mesh_level", {"auto", "full"}, 1),
       knob_of("grid", "optics.grid", {"paper-grid", "2x2", "4x4", "fine"}, 3),
