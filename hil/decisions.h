@@ -15,6 +15,7 @@ struct Decisions {
     std::uint64_t frame = 0;
     bool exposed = false;  ///< false: dropped; commands were obeyed all the same
     int passes = 0;        ///< of rendering, where a clock said when to stop; 0: none did
+    engine::Shed shed = engine::Shed::kNothing;  ///< left out, where a clock said so
   };
   std::vector<Due> due;                 ///< by frame, ascending
   std::vector<CommandRecord> commands;  ///< in the order in which they were obeyed

@@ -30,7 +30,8 @@ FrameLoop::FrameLoop(const LoopSpec& spec, Clock& clock, PointingSource& pointin
       generator_(generator),
       sink_(sink),
       source_(commands),
-      slots_(kSlots) {
+      slots_(kSlots),
+      governor_(spec.period) {
   ENSURE(spec.period > Duration{} && spec.exposure > Duration{});
   ENSURE(spec.exposure + spec.command_lead <= spec.period);
   waiting_.reserve(kMostWaiting);
@@ -86,6 +87,7 @@ bool FrameLoop::run_frame(std::uint64_t k, const std::stop_token& stop, LoopRepo
     counts_.refused.by_cause[i] = refused_now_[i].load(std::memory_order_relaxed);
   if (record.handed_over) {
     expose(k, slot, record);
+    ++report.by_shed[static_cast<std::size_t>(record.shed)];
   } else {
     ++report.dropped;
   }
@@ -200,9 +202,12 @@ void FrameLoop::expose(std::uint64_t k, std::size_t slot, FrameRecord& record) n
   engine::Budget budget;
   if (spec_.replay != nullptr) {
     budget.passes = spec_.replay->due[next_due_].passes;
+    budget.shed = spec_.replay->due[next_due_].shed;
   } else {
     budget.time = spec_.render_time;
+    if (spec_.sheds) budget.shed = governor_.shed();
   }
+  record.shed = budget.shed;
   record.report = generator_.expose(shot, budget, s.pixels, s.mask);
   if (budget.time > Duration{} || budget.passes > 0) record.passes = record.report.render.passes;
   s.frame = {.sequence = k,
@@ -216,6 +221,7 @@ void FrameLoop::expose(std::uint64_t k, std::size_t slot, FrameRecord& record) n
              .telemetry_row = {},
              .truth_mask = &s.mask};
   record.busy = std::max(Duration{}, clock_.now() - open - record.late);
+  governor_.saw(record.busy);
   ENSURE(ready_.push(slot));
   ready_count_.release();
 }

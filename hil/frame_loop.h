@@ -12,6 +12,7 @@
 #include "hil/command_gate.h"
 #include "hil/hiccup_meter.h"
 #include "hil/loop_report.h"
+#include "hil/overload_governor.h"
 #include "hil/pointing_source.h"
 #include "hil/spsc_ring.h"
 #include "hil/trigger.h"
@@ -40,8 +41,11 @@ struct LoopSpec {
   Trigger* trigger = nullptr;
   engine::Duration trigger_timeout{};
   /// Rendering stops with what it has once it has taken this long, and the record says after how
-  /// many passes. Zero: it is finished. The one thing in a frame that a clock decides.
+  /// many passes. Zero: it is finished. One of two things in a frame that a clock decides.
   engine::Duration render_time{};
+  /// A frame that took too long makes the next ones leave something out, as OverloadGovernor has
+  /// it. The other thing that a clock decides.
+  bool sheds = false;
   HiccupMeter* hiccups = nullptr;  ///< if given, says which delays are the machine's
   bool open_loop = false;          ///< commands count as reports: nothing of them is obeyed
   int service_priority = 0;        ///< SCHED_FIFO of sender and receiver; 0: ordinary
@@ -124,6 +128,7 @@ class FrameLoop {
   std::size_t next_due_ = 0;      // of a replay's decisions
   std::size_t next_command_ = 0;  // of a replay's decisions
   std::uint64_t skipped_before_ = 0;
+  OverloadGovernor governor_;
   LoopCounts counts_;
   HiccupHistory hiccups_;
   std::optional<RunTimeMeter> run_time_;  // of the thread in run()

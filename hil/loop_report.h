@@ -21,7 +21,8 @@ struct FrameRecord {
   MeasuredAttitude measured;
   std::uint64_t skipped_before = 0;  ///< periods lost before this frame, because we were too slow
   int passes = 0;                    ///< of rendering, where a clock said when to stop; 0: none did
-  bool handed_over = false;          ///< false: dropped, the link held every slot
+  engine::Shed shed = engine::Shed::kNothing;  ///< left out because time was short
+  bool handed_over = false;                    ///< false: dropped, the link held every slot
 };
 
 /// A command, and the first frame it could show in. Together with the seed, all that a run depends
@@ -41,6 +42,8 @@ struct LoopReport {
   std::uint64_t late = 0;     ///< woken over a millisecond after the deadline
   /// Frames that were late or came after skipped ones, by cause.
   std::array<std::uint64_t, kLateCauses> late_by_cause{};
+  /// Frames that were exposed, by what they left out because time was short.
+  std::array<std::uint64_t, engine::kSheds> by_shed{};
   std::uint64_t commands = 0;        ///< obeyed
   std::uint64_t command_faults = 0;  ///< packets that were none
   RefusalCounts refused;             ///< commands that the gate turned away, by cause

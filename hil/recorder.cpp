@@ -49,7 +49,9 @@ void Recorder::log(const CommandRecord& command) noexcept {
 
 void Recorder::log(const FrameRecord& frame) noexcept {
   using Kind = LogDecision::Kind;
-  const Kind exposed = frame.passes > 0 ? Kind::kExposedInPasses : Kind::kExposed;
+  const Kind exposed = frame.shed != engine::Shed::kNothing ? Kind::kExposedInHaste
+                       : frame.passes > 0                   ? Kind::kExposedInPasses
+                                                            : Kind::kExposed;
   push({LogType::kDecision,
         {},
         {.kind = frame.handed_over ? exposed : Kind::kDropped,
@@ -57,7 +59,8 @@ void Recorder::log(const FrameRecord& frame) noexcept {
          .shutter_open = frame.shutter_open,
          .late = frame.late,
          .skipped_before = frame.skipped_before,
-         .passes = frame.passes}});
+         .passes = frame.passes,
+         .shed = frame.shed}});
 }
 
 void Recorder::push(const Entry& entry) noexcept {

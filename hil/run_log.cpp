@@ -154,9 +154,15 @@ bool decode(std::span<const std::byte> in, LogDecision& d) {
   Reader r(in);
   r.get(d.kind).get(d.frame).get(d.shutter_open).get(d.late).get(d.skipped_before);
   using Kind = LogDecision::Kind;
+  const bool in_haste = d.kind == Kind::kExposedInHaste;
   const bool in_passes = d.kind == Kind::kExposedInPasses;
-  if (in_passes) r.get(d.passes);
-  if (!r.done() || in_passes != (d.passes > 0)) return false;
+  if (in_passes || in_haste) r.get(d.passes);
+  if (in_haste) r.get(d.shed);
+  if (!r.done()) return false;
+  if (in_haste)
+    return d.passes >= 0 && d.shed > engine::Shed::kNothing &&
+           static_cast<int>(d.shed) < engine::kSheds;
+  if (in_passes != (d.passes > 0)) return false;
   return in_passes || d.kind == Kind::kExposed || d.kind == Kind::kDropped;
 }
 
@@ -196,7 +202,7 @@ const char* add(const RawRecord& record, Recording& out) {
       auto& due = out.decisions.due;
       if (d.frame >= out.start.loop.frames || (!due.empty() && d.frame <= due.back().frame))
         return kNonsense;
-      due.push_back({d.frame, d.kind != LogDecision::Kind::kDropped, d.passes});
+      due.push_back({d.frame, d.kind != LogDecision::Kind::kDropped, d.passes, d.shed});
       return nullptr;
     }
     case LogType::kEnd: {
@@ -241,7 +247,9 @@ void encode(const CommandRecord& record, LogBytes& out) {
 void encode(const LogDecision& d, LogBytes& out) {
   Writer w(out);
   w.put(d.kind).put(d.frame).put(d.shutter_open).put(d.late).put(d.skipped_before);
-  if (d.kind == LogDecision::Kind::kExposedInPasses) w.put(d.passes);
+  const bool in_haste = d.kind == LogDecision::Kind::kExposedInHaste;
+  if (in_haste || d.kind == LogDecision::Kind::kExposedInPasses) w.put(d.passes);
+  if (in_haste) w.put(d.shed);
 }
 
 void encode(const LogEnd& end, LogBytes& out) {

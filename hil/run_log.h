@@ -22,8 +22,9 @@ namespace hil {
 ///   command   each that was obeyed: from which frame on, sender, its packet (space_packet.h), and
 ///             in full what the packet rounds
 ///   decision  what became of each frame that the loop came to; it stands after all commands up to
-///             that frame, and after how many passes a clock stopped rendering it. Its kind
-///             leaves room for what else a clock may decide
+///             that frame, and after how many passes a clock stopped rendering it, and what it
+///             left out because the frames before took too long. Its kind room for what else a
+///             clock may decide
 ///   end       last: the loop's counts. A run that was killed has none
 enum class LogType : std::uint32_t {
   kStart = 1,
@@ -57,15 +58,22 @@ struct LogFrame {
 };
 
 struct LogDecision {
-  /// Only kExposedInPasses has `passes`, after all the rest. A program that does not know a kind
+  /// Only kExposedInPasses has `passes`, after all the rest, and only kExposedInHaste `passes` and
+  /// `shed`. A program that does not know a kind
   /// reads a log no further, instead of making other pixels of it.
-  enum class Kind : std::uint32_t { kExposed = 1, kDropped = 2, kExposedInPasses = 3 };
+  enum class Kind : std::uint32_t {
+    kExposed = 1,
+    kDropped = 2,
+    kExposedInPasses = 3,
+    kExposedInHaste = 4
+  };
   Kind kind = Kind::kExposed;
   std::uint64_t frame = 0;
   engine::SimTime shutter_open{};
   engine::Duration late{};  ///< for the record: it decides nothing
   std::uint64_t skipped_before = 0;
   std::int32_t passes = 0;  ///< above 0: after how many rendering was stopped
+  engine::Shed shed = engine::Shed::kNothing;
 };
 
 struct LogEnd {

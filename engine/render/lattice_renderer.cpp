@@ -62,7 +62,8 @@ LatticeRenderer::Bench& LatticeRenderer::take_bench() noexcept {
 RenderReport LatticeRenderer::render(const Snapshot& snapshot, Budget budget,
                                      Radiance& out) noexcept {
   const int s = spec_.grid.oversampling;
-  if (!view_.place(snapshot, spec_.lattice_side, budget.samples_per_pixel))
+  const int most_points = budget.shed >= Shed::kSamples ? 1 : budget.samples_per_pixel;
+  if (!view_.place(snapshot, spec_.lattice_side, most_points))
     return paths_.render(snapshot, budget, out);
 
   const PixelRect region = view_.region();
@@ -75,15 +76,16 @@ RenderReport LatticeRenderer::render(const Snapshot& snapshot, Budget budget,
   out.cover.resize(out.grid.width(), out.grid.height());
   RenderReport report;
   report.samples_per_pixel = view_.points_a_pixel() * view_.points_a_pixel();
-  report.bounces = spec_.bounces;
+  bounces_ = budget.shed >= Shed::kBounces ? 0 : spec_.bounces;
+  report.bounces = bounces_;
   report.visible_fraction = view_.footprint().visible_fraction();
   constexpr double kNotKnown = std::numeric_limits<double>::quiet_NaN();
   report.add({"method", "lattice", kNotKnown});
-  report.add(
-      bounces_rung(std::min(spec_.bounces, BouncedLight::kMostBounces), spec_.bounces_left_out_e));
+  report.add(bounces_rung(std::min(bounces_, BouncedLight::kMostBounces),
+                          bounces_ == spec_.bounces ? spec_.bounces_left_out_e : kNotKnown));
   if (region.empty()) return report;
   report.add({"sun disc", spec_.sun_disc == SunDisc::kOff ? "none" : "glints", kNotKnown});
-  cap_ = !snapshot.earth.dark() && spec_.bounces > 0;
+  cap_ = !snapshot.earth.dark() && bounces_ > 0;
   // Harmonics stand for the cap; without bounces there are no texels for it.
   const bool is_lamp = snapshot.earth.dark();
   const EarthshineModel taken = is_lamp ? snapshot.earthshine_rung.model
@@ -97,7 +99,9 @@ RenderReport LatticeRenderer::render(const Snapshot& snapshot, Budget budget,
   texel_lamp_ = snapshot.sun.irradiance_w_m2 > 0.0 || cap_ ? 0 : 1;
   const double limit = budget.rho_mc > 0.0 ? budget.rho_mc : spec_.profile.rho_mc;
   light_up(snapshot);
-  if (spec_.bounces > 0) {
+  const bool as_it_stands = budget.shed >= Shed::kUpkeep && kept_lamp_ == texel_lamp_;
+  if (bounces_ > 0 && !as_it_stands) {
+    kept_lamp_ = texel_lamp_;
     const TexelLight::LampInView lamp{texel_lamp_, lamp_views_[texel_lamp_]};
     const double px_m = snapshot.camera.m.norm() * spec_.camera.ifov_rad();
     const auto cell_m = static_cast<float>(px_m / s);
@@ -144,7 +148,7 @@ void LatticeRenderer::light_up(const Snapshot& snapshot) noexcept {
     const bool asked = lamps_of(direct)[k]->irradiance_w_m2 > 0.0 || k == texel_lamp_;
     if (asked) lamp_views_[k].update(lamps[k]->toward.unit, pool_);
   }
-  body_light_.light_up(snapshot, pool_);
+  if (bounces_ > 0) body_light_.light_up(snapshot, pool_);
 }
 
 void LatticeRenderer::shade_row(const Snapshot& snapshot, Radiance& out, int index) noexcept {
@@ -203,7 +207,7 @@ void LatticeRenderer::shade(const Row& row, int column, const Tone& tone) noexce
       static_cast<float>(row.index * n) + static_cast<float>(sum_y) / half_steps, direction);
   const PixelOnFacet pixel = pixel_on(tone.facet, column, row.index);
   CellLight light{};
-  if (spec_.bounces > 0) add_kept(row, column, tone, middle, pixel, light);
+  if (bounces_ > 0) add_kept(row, column, tone, middle, pixel, light);
   for (std::size_t k = 0; k < kLamps; ++k)
     if (target_->facets.radiance(tone.facet)[k] > 0.0F)
       add_lamp(row, column, tone, k, pixel, light);
@@ -215,6 +219,7 @@ void LatticeRenderer::shade(const Row& row, int column, const Tone& tone) noexce
     tally.squares += points * light[cell] * light[cell];
   }
 
+  if (bounces_ == 0 && spec_.bounces > 0) return;  // what mirrors see was not lit
   const float share =
       body_light_.mirror_share(middle.material, -middle.normal.dot(direction) / direction.norm());
   if (share <= 0.0F) return;

@@ -121,11 +121,13 @@ class LatticeRenderer final : public Renderer {
   std::vector<std::unique_ptr<Bench>> benches_;  ///< one a thread
   std::vector<RowCounts> row_counts_;            ///< by row of pixels
   bool begun_ = false;                           ///< there was a frame with bounces
+  std::size_t kept_lamp_ = kLamps;               ///< whose light the texels have
   // Of the frame in hand.
   std::array<Eigen::Vector3f, kLamps> toward_lamp_;
   std::size_t texel_lamp_ = 0;  ///< the brighter one
-  bool cap_ = false;            ///< the Earth's light is its cap's, kept by texels
-  float cells_alike_ = 1;       ///< so many see the same texel
+  int bounces_ = 0;
+  bool cap_ = false;       ///< the Earth's light is its cap's, kept by texels
+  float cells_alike_ = 1;  ///< so many see the same texel
 };
 
 }  // namespace engine

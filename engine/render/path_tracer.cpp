@@ -185,9 +185,20 @@ double PathTracer::sun_radius_for(const Snapshot& snapshot, RenderReport& report
   return soft ? kSunAngularRadius_rad : 0.0;
 }
 
-/// wanted_: by the budget, by the scenario, or by a pilot.
+/// wanted_: by the budget, by the scenario, or by a pilot; and less where time is short.
 void PathTracer::choose_samples(const Snapshot& snapshot, const Budget& budget,
                                 const PixelRect& region) noexcept {
+  plan_samples(snapshot, budget, region);
+  const unsigned quarters = budget.shed < Shed::kSamples    ? 0U
+                            : budget.shed == Shed::kSamples ? 1U
+                                                            : 2U;
+  if (quarters == 0) return;
+  const std::size_t pixels = at(region.width()) * at(region.height());
+  for (std::size_t i = 0; i < pixels; ++i) wanted_[i] = std::max(1U, wanted_[i] >> 2 * quarters);
+}
+
+void PathTracer::plan_samples(const Snapshot& snapshot, const Budget& budget,
+                              const PixelRect& region) noexcept {
   const int side = spec_.grid.oversampling;
   const std::size_t pixels = at(region.width()) * at(region.height());
   const int fixed = budget.samples_per_pixel > 0 ? budget.samples_per_pixel

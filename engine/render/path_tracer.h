@@ -66,6 +66,8 @@ class PathTracer final : public Renderer {
   void light_up(const Snapshot& snapshot, RenderReport& report) noexcept;
   void choose_samples(const Snapshot& snapshot, const Budget& budget,
                       const PixelRect& region) noexcept;
+  void plan_samples(const Snapshot& snapshot, const Budget& budget,
+                    const PixelRect& region) noexcept;
   void pilot_row(const Snapshot& snapshot, const PixelRect& region, int row) noexcept;
   /// `start`: when the frame began, by the clock that it is to be ready by.
   void run_passes(const Snapshot& snapshot, const Budget& budget, Duration start, Radiance& out,

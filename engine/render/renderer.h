@@ -61,12 +61,29 @@ struct SensorNoise {
   }
 };
 
+/// What a frame leaves out because time is short: each has what stands before it. In the order of
+/// what a picture loses by it.
+enum class Shed : std::uint8_t {
+  kNothing,
+  kUpkeep,   ///< what is kept from frame to frame is shown as it stands: nothing of it is renewed
+  kSamples,  ///< the coarsest lattice; of paths a quarter of the samples
+  kBounces   ///< light that bounces; of paths another three quarters of the samples
+};
+inline constexpr int kSheds = 4;
+/// "nothing", "upkeep", "samples" and "bounces".
+[[nodiscard]] constexpr std::string_view name_of(Shed shed) noexcept {
+  constexpr std::array<std::string_view, kSheds> kNames = {"nothing", "upkeep", "samples",
+                                                           "bounces"};
+  return kNames[static_cast<std::size_t>(shed)];
+}
+
 /// What a frame may cost. 0 leaves it to the renderer's own setting.
 struct Budget {
   int samples_per_pixel = 0;  ///< so many in every pixel, whatever the noise
   double rho_mc = 0;          ///< the largest Monte Carlo error after the optics, in sigmas, rms
   Duration time{};            ///< passes go on while the next one is likely to fit
   int passes = 0;             ///< so many, whatever the time: what a replay obeys
+  Shed shed = Shed::kNothing;
   /// PathTracer: of samples_per_pixel, what the image has already from the call before, with the
   /// same snapshot at the same place. The rest goes on where those ended.
   int samples_done = 0;
@@ -113,7 +130,7 @@ struct RenderReport {
   double visible_fraction = 0;
   std::array<double, kMostCompanions> visible_fraction_of_companion{};
   NoiseReached rho_mc;
-  static constexpr std::size_t kMostRungs = 8;
+  static constexpr std::size_t kMostRungs = 10;
   std::array<Rung, kMostRungs> rungs{};  ///< those with a name
 
   /// One too many is lost.

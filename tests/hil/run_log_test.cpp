@@ -183,6 +183,33 @@ TEST(RunLog, PassesOfAFrameThatAClockStoppedComeBack) {
   EXPECT_FALSE(got.decisions.due[2].exposed);
 }
 
+TEST(RunLog, WhatAFrameLeftOutForWantOfTimeComesBack) {
+  const TempFile file("haste.slog");
+  LogDecision hasty = decided(1);
+  hasty.kind = LogDecision::Kind::kExposedInHaste;
+  hasty.shed = engine::Shed::kSamples;
+  LogDecision both = hasty;
+  both.frame = 2;
+  both.passes = 3;
+  LogDecision nonsense = hasty;
+  nonsense.frame = 3;
+  nonsense.shed = static_cast<engine::Shed>(engine::kSheds);
+  {
+    RawLog log(file.path(), Duration{});
+    append(log, LogType::kStart, small_start());
+    append(log, LogType::kDecision, hasty);
+    append(log, LogType::kDecision, both);
+    append(log, LogType::kDecision, nonsense);
+  }
+  const Recording got = hil::load_recording(file.path());
+  EXPECT_EQ(got.fault.find("a record that makes no sense"), 0U) << got.fault;
+  ASSERT_EQ(got.decisions.due.size(), 2U);
+  EXPECT_EQ(got.decisions.due[0].shed, engine::Shed::kSamples);
+  EXPECT_EQ(got.decisions.due[0].passes, 0);
+  EXPECT_TRUE(got.decisions.due[1].exposed);
+  EXPECT_EQ(got.decisions.due[1].passes, 3);
+}
+
 TEST(RunLog, FramesDecisionsAndTheEndComeBack) {
   const TempFile file("all.slog");
   LogFrame frame;

@@ -27,6 +27,7 @@ hil::LoopSpec loop_spec(const Scenario& scenario, engine::SimTime start, Duratio
   spec.exposure = run.exposure;
   spec.command_lead = run.command_lead;
   spec.render_time = run.render_time;
+  spec.sheds = run.sheds;
   spec.width_px = scenario.scene.camera.width_px;
   spec.height_px = scenario.scene.camera.height_px;
   spec.bits = scenario.detector.bits;

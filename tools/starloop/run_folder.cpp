@@ -161,7 +161,7 @@ void write_tables(const fs::path& folder, const Scenario& scenario, const RunLog
       "error_u_px,error_v_px,trim_x_urad,trim_y_urad,smear_px,peak_e,peak_dn,"
       "geometry_ms,render_ms,optics_ms,detector_ms,busy_ms,late_ms,"
       "samples,hits,rays,rejected_rays,wing_px,skipped_before,handed_over,rho_mc,rho_mc_worst,"
-      "passes,firefly_px,full_well_px,no_light_px,cosmic_rays");
+      "passes,firefly_px,full_well_px,no_light_px,cosmic_rays,shed");
   for (const std::string& name : companion_names(scenario))
     for (const char* column : {"range_km", "u_px", "v_px", "visible_fraction"})
       std::fprintf(file.get(), ",%s_%s", name.c_str(), column);
@@ -185,7 +185,8 @@ void write_tables(const fs::path& folder, const Scenario& scenario, const RunLog
                  r.trim_rad[0] * 1e6, r.trim_rad[1] * 1e6, t.smear_px, t.peak_e, p.peak_dn);
     std::fprintf(
         file.get(),
-        "%.3f,%.3f,%.3f,%.3f,%.3f,%.3f,%llu,%llu,%llu,%llu,%d,%llu,%d,%.4f,%.4f,%d,%d,%d,%d,%d",
+        "%.3f,%.3f,%.3f,%.3f,%.3f,%.3f,%llu,%llu,%llu,%llu,%d,%llu,%d,%.4f,%.4f,%d,%d,%d,%d,%d,"
+        "%s",
         ms(p.times.geometry), ms(p.times.render), ms(p.times.optics), ms(p.times.detector),
         ms(r.busy), ms(r.late), static_cast<unsigned long long>(p.render.samples),
         static_cast<unsigned long long>(p.render.hits),
@@ -193,7 +194,8 @@ void write_tables(const fs::path& folder, const Scenario& scenario, const RunLog
         static_cast<unsigned long long>(p.render.rejected_rays), p.optics.wing_px,
         static_cast<unsigned long long>(r.skipped_before), r.handed_over ? 1 : 0,
         p.render.rho_mc.rms, p.render.rho_mc.worst, p.render.passes, p.render.rho_mc.firefly_px,
-        p.detector.full_well_px, p.detector.no_light_px, p.detector.cosmic_rays);
+        p.detector.full_well_px, p.detector.no_light_px, p.detector.cosmic_rays,
+        name_of(r.shed).data());
     for (std::size_t i = 0; i < t.companions; ++i) {
       const engine::CompanionTruth& c = t.companion[i];
       std::fprintf(file.get(), ",%.6f,%.4f,%.4f,%.4f", c.range_m * 1e-3, c.target_px.u,

@@ -41,6 +41,9 @@ RunSpec read_run(const ConfigTable& table) {
                                           {"lockstep", ClockMode::kLockstep},
                                           {"as-fast-as-possible", ClockMode::kAsFastAsPossible},
                                           {"triggered", ClockMode::kTriggered}});
+  // No other run asks a clock.
+  run.sheds = table.choice_or<bool>("overload", "shed", {{"shed", true}, {"skip", false}}) &&
+              run.clock == ClockMode::kRealtime;
   run.trigger = table.text_or("trigger", "packet");
   run.trigger_where = table.where("trigger");
   run.trigger_timeout =

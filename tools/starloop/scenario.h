@@ -42,6 +42,7 @@ struct RunSpec {
   engine::Duration period{};
   engine::Duration command_lead{};
   engine::Duration render_time{};  ///< of a frame, at most; zero: as long as it takes
+  bool sheds = false;              ///< frames that take too long make the next leave something out
   engine::Duration answer_timeout{};
   ClockMode clock = ClockMode::kRealtime;
   std::string trigger;        ///< "packet", "stdin", or the path of a pipe: a line is a pull

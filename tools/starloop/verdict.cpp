@@ -58,7 +58,12 @@ void print_detections(const DetectionVerdict& verdict) {
 
 /// What the scenario asks to leave out, and what no model has yet.
 std::vector<std::string> left_out(const Scenario& s) {
-  std::vector<std::string> list = {"defocus", "PRNU, DSNU and defects"};
+  std::vector<std::string> list;
+  const engine::DetectorSpec& d = s.detector;
+  const bool all_alike = d.prnu_rms == 0.0 && d.dsnu_rms == 0.0 && d.prnu_map.path.empty() &&
+                         d.dsnu_map.path.empty() && d.hot_pixels == 0.0 && d.dead_pixels == 0.0 &&
+                         d.hot_columns == 0 && d.dead_columns == 0;
+  if (all_alike) list.emplace_back("PRNU, DSNU and defects");
   if (!s.scene.earth.in_frame) list.emplace_back("the Earth behind the target");
   if (s.stars.source == engine::StarSpec::Source::kNone) list.emplace_back("stars");
   const bool hard = s.render.method == engine::RenderMethod::kLattice;
@@ -69,6 +74,14 @@ std::vector<std::string> left_out(const Scenario& s) {
   if (!s.companions.empty()) list.emplace_back("companions' smear: the frame has the target's");
   if (!s.parts.empty()) list.emplace_back("that parts turn while the shutter is open");
   return list;
+}
+
+/// Frames by what they left out.
+nlohmann::ordered_json shed_json(const hil::LoopReport& report) {
+  nlohmann::ordered_json json;
+  for (std::size_t i = 0; i < report.by_shed.size(); ++i)
+    json[std::string(name_of(static_cast<engine::Shed>(i)))] = report.by_shed[i];
+  return json;
 }
 
 }  // namespace
@@ -118,6 +131,7 @@ void write_report(const std::filesystem::path& folder, const Scenario& s, const 
          {{"own_work", of_cause(l, hil::LateCause::kOwnWork)},
           {"machine", of_cause(l, hil::LateCause::kMachine)},
           {"unknown", of_cause(l, hil::LateCause::kUnknown)}}},
+        {"left_out_for_want_of_time", shed_json(l)},
         {"records_lost", l.records_lost}}},
       {"commands",
        {{"taken", l.commands},
@@ -166,6 +180,12 @@ void print_summary(const Scenario& s, const RunLog& log, const Verdict& v, bool 
         "{} frames late or after skipped ones: {} our own work, {} the machine, {} unknown",
         delayed, of_cause(l, hil::LateCause::kOwnWork), of_cause(l, hil::LateCause::kMachine),
         of_cause(l, hil::LateCause::kUnknown));
+  if (const auto [whole, upkeep, samples, bounces] = l.by_shed; upkeep + samples + bounces > 0)
+    spdlog::info(
+        "for want of time {} frames left out the upkeep of kept light, {} samples, too, {} "
+        "bounces, "
+        "too; {} were whole",
+        upkeep, samples, bounces, whole);
   if (log.machine)
     spdlog::info("the machine's own stalls: p99.9 {:.2f} ms, worst {:.2f} ms",
                  seconds(log.machine->quantile(0.999)) * 1e3, seconds(log.machine->worst()) * 1e3);

@@ -423,5 +423,50 @@ TEST(LatticeRenderer, SurvivesASnapshotThatIsNotANumber) {
   EXPECT_EQ(sum_of(rig.render(snapshot)), 0.0);
 }
 
+std::vector<float> cells_of(const Radiance& light) {
+  return {light.grid.pixels().begin(), light.grid.pixels().end()};
+}
+
+TEST(LatticeRenderer, WithoutBouncesForWantOfTimeALightIsADirectOne) {
+  const Snapshot snapshot =
+      view_from(Vector3d(0.5, 0.4, 0.77).normalized() * kRange_m, {0.9, 0.5, 0.1});
+  Rig all(spec_of(128, 1), telescope(), telescope_materials());
+  RenderSpec direct = spec_of(128);
+  direct.lattice_side = 2;
+  Rig none(direct, telescope(), telescope_materials());
+  static_cast<void>(all.render(snapshot));  // something is kept by now
+  EXPECT_EQ(cells_of(all.render(snapshot, {.shed = Shed::kBounces})),
+            cells_of(none.render(snapshot)));
+  EXPECT_EQ(all.report.bounces, 0);
+  EXPECT_EQ(all.report.samples_per_pixel, 36);
+}
+
+TEST(LatticeRenderer, WhatIsKeptIsShownAsItStandsForWantOfTimeAndTakenUpAgainAfterwards) {
+  const Vector3d from = Vector3d(0.5, 0.4, 0.77).normalized() * kRange_m;
+  const Snapshot snapshot = view_from(from, {0.9, 0.5, 0.1});
+  RenderSpec spec = spec_of(128, 1);
+  spec.lattice_side = 4;
+  Rig hasty(spec, telescope(), telescope_materials());
+  Rig patient(spec, telescope(), telescope_materials());
+  const double first = sum_of(hasty.render(snapshot));
+  static_cast<void>(patient.render(snapshot));
+  const std::uint64_t rays = hasty.report.rays;
+  const double second = sum_of(hasty.render(snapshot, {.shed = Shed::kUpkeep}));
+  // The same light but for what frames after the first add to it, and no rays for texels.
+  EXPECT_NEAR(second / first, 1.0, 0.002);
+  EXPECT_LT(hasty.report.rays, rays / 2);
+  // A frame that was left out is as if it had not been.
+  EXPECT_EQ(cells_of(hasty.render(snapshot)), cells_of(patient.render(snapshot)));
+}
+
+TEST(LatticeRenderer, AFirstFrameForWhichThereIsNoTimeHasItsLightAllTheSame) {
+  const Snapshot snapshot =
+      view_from(Vector3d(0.5, 0.4, 0.77).normalized() * kRange_m, {0.9, 0.5, 0.1});
+  Rig rig(spec_of(128, 1), telescope(), telescope_materials());
+  Rig plain(spec_of(128, 1), telescope(), telescope_materials());
+  EXPECT_EQ(cells_of(rig.render(snapshot, {.shed = Shed::kUpkeep})),
+            cells_of(plain.render(snapshot)));
+}
+
 }  // namespace
 }  // namespace engine
