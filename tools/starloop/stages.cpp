@@ -11,6 +11,7 @@
 #include "tools/starloop/file_names.h"
 #include "tools/starloop/plot_script.h"
 #include "tools/starloop/rig.h"
+#include "tools/starloop/stage_images.h"
 #include "tools/starloop/subcommands.h"
 
 namespace starloop {
@@ -48,25 +49,6 @@ engine::DetectorSpec photons_alone(engine::DetectorSpec spec) {
   spec.cosmic_rays_cm2_s = 0;
   spec.blooming = engine::Blooming::kNone;
   return spec;
-}
-
-engine::Radiance render_radiance(const Scenario& scenario, const engine::Snapshot& snapshot,
-                                 const engine::GridWish& wish, engine::Renderer& renderer) {
-  engine::Radiance radiance;
-  radiance.earth.reserve(scenario.scene.camera, wish.beyond_frame_px);
-  radiance.earth.draw(snapshot.earth_in_frame, snapshot.background_w_m2_sr);
-  renderer.render(snapshot, engine::Budget{}, radiance);
-  radiance.range_m = snapshot.range_m;
-  radiance.path = snapshot.path;
-  return radiance;
-}
-
-engine::IrradianceImage projected(engine::Optics& optics, const engine::Radiance& radiance,
-                                  const engine::CameraGeometry& camera) {
-  engine::IrradianceImage out(camera.width_px, camera.height_px);
-  optics.project(radiance, out);
-  optics.veil(out);
-  return out;
 }
 
 /// What pixels collect on average.
@@ -168,7 +150,7 @@ int render_stages(const CommonOptions& options, const StagesOptions& stages) {
   const engine::Snapshot snapshot =
       parts.scene.build(rig.predicted_shot(engine::sim_time(stages.time_s), exposure));
   const engine::Radiance radiance =
-      render_radiance(scenario, snapshot, parts.optics.wish(), *parts.renderer);
+      render_radiance(camera, snapshot, parts.optics.wish(), *parts.renderer);
   const engine::IrradianceImage still = projected(still_optics, radiance, camera);
   const engine::IrradianceImage shaken = projected(parts.optics, radiance, camera);
   const engine::ElectronImage still_e = mean_electrons(still, spec, exposure);
