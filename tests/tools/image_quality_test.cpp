@@ -64,12 +64,12 @@ ImageQuality quality_of(const DnImage& image, double e_per_dn = 0) {
 
 void expect_finite(const ImageQuality& q) {
   for (const double figure :
-       {q.background_dn, q.noise_dn.value_or(0), q.contrast_dn, q.contrast_sigma, q.sharpness,
+       {q.background_dn, q.noise_dn.value_or(0), q.contrast_dn, q.contrast_sigma, q.sharpness.value_or(0),
         q.edge_px.value_or(0), q.place_px.value_or(0), q.score_db.value_or(0)})
     EXPECT_TRUE(std::isfinite(figure));
   EXPECT_EQ(q.score_db.has_value(), q.verdict == Verdict::kMeasured);
-  EXPECT_GE(q.sharpness, 0.0);
-  EXPECT_LE(q.sharpness, 1.0);
+  EXPECT_GE(q.sharpness.value_or(0.0), 0.0);
+  EXPECT_LE(q.sharpness.value_or(0.0), 1.0);
 }
 
 class NoiseSigma : public testing::TestWithParam<double> {};

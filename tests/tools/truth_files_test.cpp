@@ -274,4 +274,60 @@ TEST(TruthRecorder, CocoDescribesThePicturesThatAreThere) {
   }
 }
 
+/// A picture of a square of so many DN above a dark sky.
+engine::DnImage square_of(std::uint16_t dn) {
+  engine::DnImage image(kWidth_px, kHeight_px);
+  for (int v = 3; v < 9; ++v)
+    for (int u = 5; u < 14; ++u) image.at(u, v) = dn;
+  return image;
+}
+
+TEST(TruthRecorder, EveryFrameThatWasHandedOverHasAScoreOfItsOwnPicture) {
+  const TemporaryFolder folder;
+  TruthRecorder::Spec spec = spec_for(folder, hil::WhenBusy::kWait);
+  spec.camera = quality::CameraFigures{2047, 10.0};
+  TruthRecorder recorder(spec);
+  for (std::uint64_t i = 0; i < 20; ++i) {
+    Shown shown(i);
+    const engine::DnImage picture = square_of(static_cast<std::uint16_t>(i * 50));
+    hil::Frame frame = shown.sent();
+    frame.pixels = &picture;
+    shown.record.handed_over = i != 7;
+    if (i != 7) {
+      ASSERT_TRUE(recorder.send(frame, kPatience).ok());
+    }
+    recorder.add(shown.record);
+  }
+  recorder.finish();
+  const std::vector<json> lines = lines_of(folder);
+  ASSERT_EQ(lines.size(), 20U);
+  EXPECT_TRUE(lines[7].at("image_quality").is_null());
+  EXPECT_EQ(lines[0].at("image_quality").at("verdict"), "nothing");
+  EXPECT_TRUE(lines[0].at("image_quality").at("score_db").is_null());
+  for (const std::size_t i : {1U, 6U, 8U, 19U})
+    EXPECT_EQ(lines[i].at("image_quality").at("contrast_dn"), 50.0 * static_cast<double>(i));
+  const json summary = recorder.quality_json();
+  EXPECT_EQ(summary.at("frames"), 19);
+  EXPECT_EQ(summary.at("scored"), 18);
+  EXPECT_EQ(summary.at("without_score").at("nothing"), 1);
+  EXPECT_EQ(summary.at("worst_frame"), 1);  // the dimmest
+  EXPECT_EQ(summary.at("median_contrast_sigma"),
+            lines[10].at("image_quality").at("contrast_sigma"));
+  const std::string csv = content_of(folder.path() / "quality.csv");
+  EXPECT_EQ(std::ranges::count(csv, '\n'), 20);  // with its header
+  EXPECT_EQ(csv.find("nan"), std::string::npos);
+}
+
+TEST(TruthRecorder, WithoutACameraNothingIsScored) {
+  const TemporaryFolder folder;
+  TruthRecorder recorder(spec_for(folder, hil::WhenBusy::kWait));
+  Shown shown(3);
+  ASSERT_TRUE(recorder.send(shown.sent(), kPatience).ok());
+  recorder.add(shown.record);
+  recorder.finish();
+  EXPECT_TRUE(recorder.quality_json().is_null());
+  EXPECT_FALSE(lines_of(folder).at(0).contains("image_quality"));
+  EXPECT_FALSE(std::filesystem::exists(folder.path() / "quality.csv"));
+}
+
 }  // namespace

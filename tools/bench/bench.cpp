@@ -15,6 +15,7 @@
 #include "engine/scene/obj_file.h"
 #include "engine/scene/sdf/delaunay.h"
 #include "engine/scene/sdf_mesher.h"
+#include "tools/quality/image_quality.h"
 #include "tools/starloop/rig.h"
 #include "tools/starloop/scenario.h"
 

@@ -80,6 +80,8 @@ class Run:
         self.troubles = []
         self.frames = read_table(self.folder / "frames.csv", self.troubles)
         self.detections = read_table(self.folder / "detections.csv", self.troubles)
+        self.quality = (read_table(self.folder / "quality.csv", self.troubles)
+                        if self.section("image_quality") else {})
         self.commands = read_table(self.folder / "commands.csv", self.troubles)
 
     def section(self, key):
@@ -195,6 +197,26 @@ def detection(run):
     return table(None, rows)
 
 
+def image_quality(run):
+    q = run.section("image_quality")
+    if not q:
+        return "<p class=note>Pictures were not scored in this run (record.quality).</p>"
+    without = q.get("without_score") if isinstance(q.get("without_score"), dict) else {}
+    causes = "; ".join(f"{html.escape(k.replace('_', ' '))} {shown(v)}"
+                       for k, v in without.items() if v)
+    rows = [
+        ("frames with a score", f"{shown(q.get('scored'))} of {shown(q.get('frames'))}"
+         + (f" ({causes})" if causes else "")),
+        ("score: median (dB)", shown(q.get("median_score_db"))),
+        ("score: worst (dB), in frame",
+         f"{shown(q.get('worst_score_db'))}, {shown(q.get('worst_frame'))}"),
+        ("sharpness: median", shown(q.get("median_sharpness"))),
+        ("contrast: median (sigma)", shown(q.get("median_contrast_sigma"))),
+        ("noise of the background: median (DN)", shown(q.get("median_noise_dn"))),
+    ]
+    return table(None, rows)
+
+
 def percentiles(run):
     rows = []
     for name, p in run.section("statistics").items():
@@ -259,6 +281,7 @@ def page(run, keep=None):
         verdict(run), criteria(run),
         f"<section><h2>Counts</h2>{counts(run)}</section>",
         f"<section><h2>Detections</h2>{detection(run)}</section>",
+        f"<section><h2>Image quality</h2>{image_quality(run)}</section>",
         f"<section><h2>Percentiles</h2>{percentiles(run)}</section>",
         *plots(run, keep),
         picture(run, "contact_sheet.png", "What the camera saw"),

@@ -1,6 +1,7 @@
 #include "tools/quality/image_quality.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "engine/core/constants.h"
@@ -49,6 +50,12 @@ std::optional<double> edge_of(double ratio) {
 }
 
 }  // namespace
+
+std::string_view name_of(Verdict verdict) noexcept {
+  constexpr std::array<std::string_view, kVerdicts> kNames{"measured", "too_small", "full_scale",
+                                                           "nothing", "too_faint"};
+  return kNames[static_cast<std::size_t>(verdict)];
+}
 
 std::string_view sentence_of(Verdict verdict) noexcept {
   switch (verdict) {

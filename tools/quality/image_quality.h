@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string_view>
@@ -25,6 +26,9 @@ enum class Verdict : std::uint8_t {
   kNothing,    ///< no group of pixels stands out of the background
   kTooFaint,   ///< one does, but no edge of it stands out of the noise
 };
+inline constexpr std::size_t kVerdicts = 5;
+/// For programs, and for people.
+[[nodiscard]] std::string_view name_of(Verdict verdict) noexcept;
 [[nodiscard]] std::string_view sentence_of(Verdict verdict) noexcept;
 
 /// How good a frame is as a picture of what it shows, without knowing what that is. No value is
@@ -33,17 +37,17 @@ struct ImageQuality {
   Verdict verdict = Verdict::kNothing;
   double background_dn = 0;
   std::optional<double>
-      noise_dn;                   ///< rms of the background before rounding; none: it hides in that
-  bool even_background = true;    ///< one level everywhere; else one for every 32 x 32 pixels
-  engine::PixelRect box;          ///< of the target
-  int lit_px = 0;                 ///< pixels of it
-  int saturated_px = 0;           ///< of these, at full scale
-  double contrast_dn = 0;         ///< rms of the target above its background
-  double contrast_sigma = 0;      ///< the same over the noise, rounding included
-  double sharpness = 0;           ///< in [0, 1]; 0: not measurable
-  std::optional<double> edge_px;  ///< sigma of the Gaussian that would blur an edge as much
-  std::optional<double> place_px;  ///< where the target is, no better than this, rms
-  std::optional<double> score_db;  ///< 20 log10(1 px / place): what falls with blur and with noise
+      noise_dn;                 ///< rms of the background before rounding; none: it hides in that
+  bool even_background = true;  ///< one level everywhere; else one for every 32 x 32 pixels
+  engine::PixelRect box;        ///< of the target
+  int lit_px = 0;               ///< pixels of it
+  int saturated_px = 0;         ///< of these, at full scale
+  double contrast_dn = 0;       ///< rms of the target above its background
+  double contrast_sigma = 0;    ///< the same over the noise, rounding included
+  std::optional<double> sharpness;  ///< in [0, 1]; none: no bend stands out of the noise
+  std::optional<double> edge_px;    ///< sigma of the Gaussian that would blur an edge as much
+  std::optional<double> place_px;   ///< where the target is, no better than this, rms
+  std::optional<double> score_db;   ///< 20 log10(1 px / place): what falls with blur and with noise
 };
 
 /// Scores frames by the target in them: the group of connected pixels that stands out of the

@@ -31,6 +31,12 @@ void run_loop(hil::FrameLoop& loop, Observer& observer, Pacing& pacing, bool qui
   if (wakes != nullptr) observer.log().machine = *wakes;
 }
 
+/// Of a test pattern there is nothing to say.
+std::optional<quality::CameraFigures> scored_camera(const Scenario& scenario) {
+  if (!scenario.run.record_quality || scenario.run.pattern) return std::nullopt;
+  return quality::CameraFigures{scenario.detector.largest_dn(), scenario.detector.gain_e_dn()};
+}
+
 }  // namespace
 
 Flight::Flight(const Plan& plan, Rig& rig)
@@ -60,6 +66,7 @@ Flight::Result Flight::fly(const std::filesystem::path& folder, const DeviceMann
                        .height_px = spec.height_px,
                        .companions = companion_names(scenario),
                        .parts = part_names(scenario),
+                       .camera = scored_camera(scenario),
                        .when_busy = spec.when_busy});
   hil::ClosedLoopPointing pointing = make_pointing(scenario, rig_, spec.start);
   pacing_.start();
@@ -81,6 +88,7 @@ Flight::Result Flight::fly(const std::filesystem::path& folder, const DeviceMann
   result.faults_injected = connections_.faults_json();
   result.command_port = connections_.port_json();
   result.truth = truth.json();
+  result.image_quality = truth.quality_json();
   return result;
 }
 

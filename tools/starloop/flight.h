@@ -29,6 +29,7 @@ class Flight {
     nlohmann::ordered_json faults_injected;
     nlohmann::ordered_json command_port;
     nlohmann::ordered_json truth;
+    nlohmann::ordered_json image_quality;
   };
 
   /// Opens link, port and trigger. Throws engine::ConfigError, and std::runtime_error when the

@@ -221,6 +221,29 @@ int run_command(int argc, char** argv) {
       ->capture_default_str();
   chart_app->add_flag("-q,--quiet", chart.quiet, "a line for each scene only");
 
+  starloop::QualityOptions quality;
+  CLI::App* quality_app = app.add_subcommand(
+      "quality", "Score pictures without knowing what they show: docs/image_quality.md");
+  quality_app->add_option("files", quality.files, "FITS files or grey PNGs")->required();
+  quality_app->add_option("--bits", quality.bits, "of a pixel; a 16-bit PNG has them at its top")
+      ->check(CLI::Range(8, 16))
+      ->capture_default_str();
+  quality_app
+      ->add_option("--gain", quality.e_per_dn,
+                   "electrons to a DN, so that the photons' noise counts; default: it does not")
+      ->check(CLI::PositiveNumber);
+  quality_app->add_flag("--json", quality.as_json, "print an array of objects");
+
+  starloop::QualityLadderOptions ladders;
+  CLI::App* ladders_app = app.add_subcommand(
+      "quality-ladders", "Turn up smear, defocus and noise of one frame, and draw its scores");
+  add_common(*ladders_app, common);
+  ladders_app->add_option("--time", ladders.time_s, "shutter opens, seconds after the epoch")
+      ->required()
+      ->check(CLI::Range(0.0, 9e9));
+  ladders_app->add_option("-o,--out", ladders.out, "folder that gets table, frames and picture")
+      ->capture_default_str();
+
   starloop::SoakOptions soak;
   CLI::App* soak_app = app.add_subcommand(
       "soak", "Fly a pass over and over; exit 1 when anything slips, grows or gets lost");
@@ -260,6 +283,8 @@ int run_command(int argc, char** argv) {
   if (bench_app->parsed()) return starloop::characterize_camera(common, bench_folder);
   if (mesh_app->parsed()) return starloop::report_mesh(mesh);
   if (shapes_app->parsed()) return starloop::mesh_shapes(shapes);
+  if (quality_app->parsed()) return starloop::score_pictures(quality);
+  if (ladders_app->parsed()) return starloop::climb_quality_ladders(common, ladders);
   if (links_app->parsed()) return starloop::list_links();
   if (passes_app->parsed()) return starloop::list_passes(common, passes);
   return starloop::render_frames(common, render);

@@ -1,5 +1,6 @@
 #include "tools/starloop/quality_ladders.h"
 
+#include <algorithm>
 #include <array>
 #include <utility>
 
@@ -86,6 +87,12 @@ class Bench {
 };
 
 }  // namespace
+
+std::string QualityLadder::frame_name(std::size_t step) const {
+  std::string file = name + "_" + std::to_string(step) + ".png";
+  std::ranges::replace(file, ' ', '_');
+  return file;
+}
 
 std::vector<QualityLadder> quality_ladders(CommonOptions options, double time_s) {
   // A rig for stages needs no generator of its own.

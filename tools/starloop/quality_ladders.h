@@ -18,6 +18,9 @@ struct QualityLadder {
   std::string name;
   std::string unit;
   std::vector<Step> steps;
+
+  /// Of a step's picture: "smear_3.png".
+  [[nodiscard]] std::string frame_name(std::size_t step) const;
 };
 
 /// One frame of a scenario, the camera looking at the target, and what it is like when smear,

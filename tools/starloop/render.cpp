@@ -11,6 +11,7 @@
 #include "tools/starloop/frame_sheet.h"
 #include "tools/starloop/orbit_notes.h"
 #include "tools/starloop/picture.h"
+#include "tools/starloop/quality_files.h"
 #include "tools/starloop/rig.h"
 #include "tools/starloop/subcommands.h"
 
@@ -146,6 +147,7 @@ int render_frames(const CommonOptions& options, const RenderOptions& render) {
   const std::string sheet_png = std::filesystem::path(out).replace_extension(".png").string();
   const bool several = render.times_s.size() > 1;
   FrameSheet sheet(render.tile_px);
+  quality::Meter meter(scenario.scene.camera.width_px, scenario.scene.camera.height_px);
   const std::string budget_csv =
       std::filesystem::path(out).replace_extension("").string() + "_budget.csv";
   BudgetTable budgets(budget_csv);
@@ -168,7 +170,12 @@ int render_frames(const CommonOptions& options, const RenderOptions& render) {
         std::printf("%s\n", note.c_str());
     if (!options.quiet && i == 0)
       for (const std::string& note : rig.material_notes()) std::printf("%s\n", note.c_str());
-    if (!options.quiet) tell(fits.string(), png, scenario, rig.star_text(), report);
+    if (options.quiet) continue;
+    tell(fits.string(), png, scenario, rig.star_text(), report);
+    const engine::DetectorSpec& detector = scenario.detector;
+    std::printf(
+        "picture: %s\n",
+        text_of(meter.measure(frame, {detector.largest_dn(), detector.gain_e_dn()})).c_str());
   }
   budgets.close();
   if (const std::string note = leap_second_note(scenario); !note.empty())

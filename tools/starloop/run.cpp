@@ -97,8 +97,11 @@ int run_pass(const CommonOptions& options, RunOptions run) {
                 .links = result.links,
                 .faults_injected = result.faults_injected,
                 .command_port = result.command_port,
-                .truth = result.truth});
+                .truth = result.truth,
+                .image_quality = result.image_quality});
   print_summary(scenario, log, verdict, run.open_loop);
+  if (const std::string line = summary_of(result.image_quality); !line.empty())
+    spdlog::info("{}", line);
   if (!run.no_pictures) draw(folder, run.compare);
   spdlog::info("results: {}", folder.string());
   if (const int code = failure_of(log.loop, scenario.run); code != kGood) return code;

@@ -91,6 +91,7 @@ void read_record(const ConfigTable& table, RunSpec& run) {
                                                      {"fits", RecordFrames::kFits},
                                                      {"cube", RecordFrames::kCube},
                                                      {"raw", RecordFrames::kRaw}});
+  run.record_quality = table.flag_or("quality", true);
   run.sync_every = from_seconds(table.number_or("sync_s", 5.0, engine::between(0.0, 3600.0)));
 }
 

@@ -51,6 +51,7 @@ struct RunSpec {
   engine::Duration start_timeout{};  ///< how long the start waits for the software under test
   std::uint64_t record_every = 10;
   RecordFrames record_frames = RecordFrames::kPng;
+  bool record_quality = true;     ///< how good a picture each frame is
   engine::Duration sync_every{};  ///< of the logs: what a power cut may cost
 };
 

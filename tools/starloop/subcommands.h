@@ -104,6 +104,23 @@ struct ChartOptions {
 /// and draws them; `out` is a folder.
 int chart_settings(const ChartOptions& options);
 
+struct QualityOptions {
+  std::vector<std::string> files;  ///< FITS, or grey pictures
+  int bits = 11;                   ///< of a pixel
+  double e_per_dn = 0;             ///< 0: not known
+  bool as_json = false;
+};
+/// Says how good pictures are without knowing what they show.
+int score_pictures(const QualityOptions& options);
+
+struct QualityLadderOptions {
+  double time_s = 0;  ///< shutter opens
+  std::string out = "quality_ladders";
+};
+/// Turns up smear, defocus and read noise and turns down the light of one frame, and writes, tells
+/// and draws what that does to its score. `out` is a folder.
+int climb_quality_ladders(const CommonOptions& options, const QualityLadderOptions& ladders);
+
 struct RunOptions {
   bool open_loop = false;
   std::string out = "out";

@@ -132,6 +132,10 @@ std::vector<std::uint32_t> coco_run_lengths(std::span<const TruthMask::Run> runs
 TruthRecorder::TruthRecorder(const Spec& spec)
     : spec_(spec), file_(spec.folder / "truth.jsonl"), coco_(std::make_unique<Json>()) {
   if (!file_) throw std::runtime_error((spec.folder / "truth.jsonl").string() + ": cannot be made");
+  if (spec.camera) {
+    meter_.emplace(spec.width_px, spec.height_px);
+    qualities_.emplace(spec.folder / "quality.csv");
+  }
   for (std::size_t i = 0; i < kSlots; ++i) {
     slots_[i].mask = TruthMask(kRunsPerRow * static_cast<std::size_t>(spec.height_px));
     ENSURE(free_.push(i));
@@ -169,6 +173,9 @@ engine::Status TruthRecorder::send(const hil::Frame& frame, engine::Duration tim
   slot.sequence = frame.sequence;
   slot.mask.clear();
   if (frame.truth_mask != nullptr) slot.mask.copy(*frame.truth_mask);
+  slot.quality.reset();
+  if (meter_ && frame.pixels != nullptr)
+    slot.quality = meter_->measure(*frame.pixels, *spec_.camera);
   ENSURE(ready_.push(i));
   news_.release();
   return engine::Done{};
@@ -202,6 +209,7 @@ void TruthRecorder::serve() noexcept {
     }
     file_.close();
     if (!file_) throw std::runtime_error("truth.jsonl: cannot be written to its end");
+    if (qualities_) qualities_->close();
   } catch (const std::exception& e) {
     std::fprintf(stderr, "starloop: %s\n", e.what());
   }
@@ -234,17 +242,23 @@ bool TruthRecorder::write_next(bool all_is_in) {
   }
   const bool here = next_mask_ && slots_[*next_mask_].sequence == wanted;
   if (!here && !next_mask_ && next_record_->handed_over && !all_is_in) return false;
-  write_line(*next_record_, here ? &slots_[*next_mask_].mask : nullptr);
+  write_line(*next_record_, here ? &slots_[*next_mask_] : nullptr);
   if (here) drop_mask();
   next_record_.reset();
   return true;
 }
 
-void TruthRecorder::write_line(const hil::FrameRecord& record, const TruthMask* mask) {
+void TruthRecorder::write_line(const hil::FrameRecord& record, const Slot* slot) {
+  const TruthMask* mask = slot != nullptr ? &slot->mask : nullptr;
   Json line = truth_of(record);
   if (!spec_.companions.empty())
     line["companions"] = companions_of(record.report.truth, spec_.companions);
   if (!spec_.parts.empty()) line["parts"] = parts_of(record.report.truth, spec_.parts);
+  if (qualities_) {
+    const bool scored = slot != nullptr && slot->quality;
+    line["image_quality"] = scored ? json_of(*slot->quality) : Json(nullptr);
+    if (scored) qualities_->add(record.sequence, record.shutter_open, *slot->quality);
+  }
   line["mask"] = mask != nullptr ? runs_of(*mask) : Json(nullptr);
   file_ << line.dump() << '\n';
   ++lines_;
@@ -294,6 +308,10 @@ void TruthRecorder::write_coco() {
   file << coco.dump() << '\n';
   file.close();
   if (!file) throw std::runtime_error(path.string() + ": cannot be written");
+}
+
+nlohmann::ordered_json TruthRecorder::quality_json() const {
+  return qualities_ ? qualities_->json() : Json(nullptr);
 }
 
 nlohmann::ordered_json TruthRecorder::json() const {

@@ -14,6 +14,7 @@
 #include "hil/camera_link.h"
 #include "hil/frame_loop.h"
 #include "hil/spsc_ring.h"
+#include "tools/starloop/quality_files.h"
 
 namespace starloop {
 
@@ -22,7 +23,8 @@ namespace starloop {
 [[nodiscard]] std::vector<std::uint32_t> coco_run_lengths(
     std::span<const engine::TruthMask::Run> runs, int width_px, int height_px);
 
-/// What each frame really showed, as two files of a run's folder.
+/// What each frame really showed, as two files of a run's folder; and how good a picture it is,
+/// which needs no truth, but is known on the same thread.
 ///
 /// truth.jsonl: an object a line and frame, dropped ones too, written as the run goes. Pixel (0, 0)
 /// has its centre at (0, 0); `box_px` and the mask's runs are whole pixels, ends excluded. `mask`
@@ -30,9 +32,9 @@ namespace starloop {
 /// coco.json: the frames of which there is a picture, as COCO's object detection data; there pixel
 /// (0, 0) reaches from 0 to 1, so that its coordinates are ours plus one half. Written at the end.
 ///
-/// A sink: it copies a frame's mask and never waits when frames may be dropped; the disk is the
-/// business of a thread of its own. A mask and its frame's record come on two threads, in any order
-/// in time, each ascending.
+/// A sink: it copies a frame's mask, scores its picture and never waits when frames may be dropped;
+/// the disk is the business of a thread of its own. A mask and its frame's record come on two
+/// threads, in any order in time, each ascending.
 class TruthRecorder final : public hil::FrameSink {
  public:
   struct Spec {
@@ -42,6 +44,8 @@ class TruthRecorder final : public hil::FrameSink {
     int height_px = 0;
     std::vector<std::string> companions{};  ///< their names
     std::vector<std::string> parts{};       ///< theirs
+    /// Of frames that are to be scored: in truth.jsonl, and in quality.csv.
+    std::optional<quality::CameraFigures> camera{};
     hil::WhenBusy when_busy = hil::WhenBusy::kDropFrame;
   };
   /// Throws std::runtime_error when truth.jsonl cannot be made.
@@ -62,21 +66,27 @@ class TruthRecorder final : public hil::FrameSink {
   [[nodiscard]] std::uint64_t masks_lost() const noexcept { return masks_lost_; }
   /// report.json's "truth".
   [[nodiscard]] nlohmann::ordered_json json() const;
+  /// report.json's "image_quality": null when frames are not scored.
+  [[nodiscard]] nlohmann::ordered_json quality_json() const;
 
  private:
   static constexpr std::size_t kSlots = 64;
   struct Slot {
     engine::TruthMask mask;
+    std::optional<quality::ImageQuality> quality;
     std::uint64_t sequence = 0;
   };
   void serve() noexcept;
   /// False: a record's mask may still come.
   [[nodiscard]] bool write_next(bool all_is_in);
-  void write_line(const hil::FrameRecord& record, const engine::TruthMask* mask);
+  /// Without a slot: the frame was dropped, or the writer was too slow.
+  void write_line(const hil::FrameRecord& record, const Slot* slot);
   void add_to_coco(const hil::FrameRecord& record, const engine::TruthMask& mask);
   void write_coco();
 
   Spec spec_;
+  std::optional<quality::Meter> meter_;  // the sender's own
+  std::optional<QualityTable> qualities_;
   std::ofstream file_;
   std::array<Slot, kSlots> slots_;
   hil::SpscRing<std::size_t, kSlots> ready_;      // sender -> writer

@@ -149,6 +149,7 @@ void write_report(const std::filesystem::path& folder, const Scenario& s, const 
       {"pictures", {{"written", kept.kept}, {"left_out", kept.left_out}, {"failed", kept.failed}}},
       {"log", {{"records", kept.records}, {"lost", kept.records_lost}}},
       {"truth", facts.truth},
+      {"image_quality", facts.image_quality},
       {"answer_missing", l.answer_missing},
       {"command_latency_frames", 1},
       {"realtime", log.realtime},

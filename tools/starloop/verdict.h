@@ -28,6 +28,7 @@ struct RunFacts {
   const nlohmann::ordered_json& faults_injected;
   const nlohmann::ordered_json& command_port;
   const nlohmann::ordered_json& truth;
+  const nlohmann::ordered_json& image_quality;
 };
 /// report.json.
 void write_report(const std::filesystem::path& folder, const Scenario& scenario, const RunLog& log,
