@@ -400,6 +400,28 @@ void expose_flyby(benchmark::State& state, const starloop::Scenario& scenario, d
   state.counters["rays"] = static_cast<double>(report.render.rays);
 }
 
+/// What a score of such a frame costs the thread that sends it.
+void bench_image_quality(benchmark::State& state) {
+  const starloop::Scenario scenario = flyby();
+  starloop::Rig rig(scenario, 1);
+  const double after_s = static_cast<double>(state.range(0));
+  const Shot shot = rig.predicted_shot(sim_time(309781.706 + after_s), scenario.run.exposure);
+  DnImage image(scenario.scene.camera.width_px, scenario.scene.camera.height_px);
+  TruthMask mask;
+  rig.generator().expose(shot, Budget{}, image, mask);
+  quality::Meter meter(image.width(), image.height());
+  const quality::CameraFigures camera{scenario.detector.largest_dn(),
+                                      scenario.detector.gain_e_dn()};
+  quality::ImageQuality quality;
+  for (auto _ : state) benchmark::DoNotOptimize(quality = meter.measure(image, camera));
+  state.counters["lit_px"] = quality.lit_px;
+}
+BENCHMARK(bench_image_quality)
+    ->ArgName("s_after_closest")
+    ->Arg(0)
+    ->Arg(20)
+    ->Unit(benchmark::kMillisecond);
+
 void bench_frame(benchmark::State& state) {
   expose_flyby(state, flyby(), static_cast<double>(state.range(0)),
                static_cast<int>(state.range(1)));

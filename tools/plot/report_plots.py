@@ -167,6 +167,19 @@ def draw_detection(run):
     return figure
 
 
+def draw_quality(run):
+    of = "quality.csv"
+    t = since_start(run.quality, of)
+    figure, (score, sharpness) = panels(2, 4.6)
+    series(score, t, column(run.quality, "score_db", of), color=X, lw=1.2)
+    score.set_ylabel("score (dB)")
+    series(sharpness, t, column(run.quality, "sharpness", of), color=Y, lw=1.2)
+    sharpness.set_ylim(0, 1)
+    sharpness.set_ylabel("sharpness")
+    sharpness.set_xlabel("time since start (s)")
+    return figure
+
+
 def draw_stages(run):
     t = since_start(run.frames, "frames.csv")
     times = [(name, colour, column(run.frames, f"{name}_ms", "frames.csv"))
@@ -208,6 +221,8 @@ PLOTS = (
     ("Pacing", "How late the loop woke up for each frame.", draw_pacing),
     ("Pointing", "Linear to 1 px, logarithmic beyond.", draw_pointing),
     ("Detection", "What was there to see in each frame, and what was said of it.", draw_detection),
+    ("Image quality by frame", "How good a picture each frame is, without knowing what it shows: "
+     "docs/image_quality.md. A gap: nothing could be measured.", draw_quality),
     ("Stage times", "What each frame cost, by stage.", draw_stages),
     ("Drop causes", "What became of every frame that was due.", draw_drops),
 )

@@ -18,10 +18,13 @@ struct Limits {
   int high = 0;  ///< pixels above do
 };
 
+/// In 16 bits, so that the compiler compares eight at once.
 bool any_outside(std::span<const std::uint16_t> pixels, const Limits& limits) {
-  int any = 0;
+  const auto low = static_cast<std::uint16_t>(std::clamp(limits.low, 0, 65535));
+  const auto high = static_cast<std::uint16_t>(std::clamp(limits.high, 0, 65535));
+  std::uint16_t any = 0;
   for (const std::uint16_t p : pixels)
-    any |= static_cast<int>(p < limits.low) | static_cast<int>(p > limits.high);
+    any = static_cast<std::uint16_t>(any | (p < low ? 1 : 0) | (p > high ? 1 : 0));
   return any != 0;
 }
 
