@@ -63,9 +63,9 @@ ImageQuality quality_of(const DnImage& image, double e_per_dn = 0) {
 }
 
 void expect_finite(const ImageQuality& q) {
-  for (const double figure :
-       {q.background_dn, q.noise_dn.value_or(0), q.contrast_dn, q.contrast_sigma, q.sharpness.value_or(0),
-        q.edge_px.value_or(0), q.place_px.value_or(0), q.score_db.value_or(0)})
+  for (const double figure : {q.background_dn, q.noise_dn.value_or(0), q.contrast_dn,
+                              q.contrast_sigma, q.sharpness.value_or(0), q.edge_px.value_or(0),
+                              q.place_px.value_or(0), q.score_db.value_or(0)})
     EXPECT_TRUE(std::isfinite(figure));
   EXPECT_EQ(q.score_db.has_value(), q.verdict == Verdict::kMeasured);
   EXPECT_GE(q.sharpness.value_or(0.0), 0.0);
@@ -252,6 +252,19 @@ TEST(ImageQuality, PixelsBeyondFullScaleDoNoHarm) {
   const auto q = quality_of(image, 14.65);
   expect_finite(q);
   EXPECT_EQ(q.saturated_px, 400);
+}
+
+TEST(ImageQuality, FramesNeedNotBeWholeTiles) {
+  const DnImage whole = picture(300, square(1.0, 3.0, 500.0), 1.0);
+  const ImageQuality reference = quality_of(whole);
+  for (const int side_px : {241, 257, 258, 288}) {
+    DnImage cut(side_px, side_px);
+    for (int v = 0; v < side_px; ++v)
+      for (int u = 0; u < side_px; ++u) cut.at(u, v) = whole.at(u, v);
+    const ImageQuality q = quality_of(cut);
+    EXPECT_NEAR(*q.noise_dn, *reference.noise_dn, 0.02) << side_px;
+    EXPECT_NEAR(*q.score_db, *reference.score_db, 0.1) << side_px;
+  }
 }
 
 TEST(ImageQuality, AMeterOfLargeFramesMeasuresSmallOnesAlike) {

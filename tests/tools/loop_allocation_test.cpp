@@ -13,6 +13,7 @@
 
 #include "drivers/mock_link.h"
 #include "tests/support/no_alloc.h"
+#include "tools/quality/image_quality.h"
 #include "tools/starloop/rig.h"
 #include "tools/starloop/scenario.h"
 
@@ -183,6 +184,25 @@ TEST(AllocationCounter, CountsEveryWayToTheHeap) {
     after = no_alloc::count();
   }).join();
   EXPECT_EQ(after - before, 1U);
+}
+
+TEST(ImageQuality, NoFrameTakesAnythingFromTheHeap) {
+  if (!no_alloc::armed()) GTEST_SKIP() << "a sanitizer counts instead";
+  quality::Meter meter(256, 256);
+  engine::DnImage frame(256, 256);
+  const std::uint64_t before = no_alloc::count();
+  int scored = 0;
+  for (int i = 0; i < 50; ++i) {
+    // From a square on black to noise with more runs than there is room for.
+    for (int v = 0; v < 256; ++v)
+      for (int u = 0; u < 256; ++u)
+        frame.at(u, v) =
+            static_cast<std::uint16_t>((u > 90 && u < 160 && v > 90 && v < 160 ? 500 : 20) +
+                                       (u * 37 + v * 101) % (1 + 40 * i));
+    if (meter.measure(frame, {2047, 14.65}).score_db) ++scored;
+  }
+  EXPECT_EQ(no_alloc::count(), before);
+  EXPECT_GT(scored, 5);
 }
 
 class LoopAllocation : public testing::TestWithParam<const char*> {};

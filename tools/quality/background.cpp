@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <utility>
 
@@ -213,9 +214,10 @@ BackgroundMeter::Tile BackgroundMeter::tile_of(const engine::DnImage& frame,
   }
   Tile tile;
   tile.level_dn = static_cast<double>(level) / (rows * static_cast<double>(n));
-  // Of white noise a second difference has six times the variance.
-  const double differences = rows * std::max(1.0, static_cast<double>(n) - 2.0);
-  tile.rough_dn2 = static_cast<double>(square) / (6.0 * differences);
+  // Of white noise a second difference has six times the variance. The last tile of a row may be
+  // too narrow for any: that it is even is not known.
+  tile.rough_dn2 = n < 3 ? std::numeric_limits<double>::max()
+                         : static_cast<double>(square) / (6.0 * rows * static_cast<double>(n - 2));
   return tile;
 }
 
