@@ -287,9 +287,10 @@ TEST(TruthRecorder, EveryFrameThatWasHandedOverHasAScoreOfItsOwnPicture) {
   TruthRecorder::Spec spec = spec_for(folder, hil::WhenBusy::kWait);
   spec.camera = quality::CameraFigures{2047, 10.0};
   TruthRecorder recorder(spec);
-  for (std::uint64_t i = 0; i < 20; ++i) {
+  // More than there are slots: each is used again.
+  for (std::uint64_t i = 0; i < 100; ++i) {
     Shown shown(i);
-    const engine::DnImage picture = square_of(static_cast<std::uint16_t>(i * 50));
+    const engine::DnImage picture = square_of(static_cast<std::uint16_t>(i * 20));
     hil::Frame frame = shown.sent();
     frame.pixels = &picture;
     shown.record.handed_over = i != 7;
@@ -300,21 +301,21 @@ TEST(TruthRecorder, EveryFrameThatWasHandedOverHasAScoreOfItsOwnPicture) {
   }
   recorder.finish();
   const std::vector<json> lines = lines_of(folder);
-  ASSERT_EQ(lines.size(), 20U);
+  ASSERT_EQ(lines.size(), 100U);
   EXPECT_TRUE(lines[7].at("image_quality").is_null());
   EXPECT_EQ(lines[0].at("image_quality").at("verdict"), "nothing");
   EXPECT_TRUE(lines[0].at("image_quality").at("score_db").is_null());
-  for (const std::size_t i : {1U, 6U, 8U, 19U})
-    EXPECT_EQ(lines[i].at("image_quality").at("contrast_dn"), 50.0 * static_cast<double>(i));
+  for (const std::size_t i : {1U, 6U, 8U, 70U, 99U})
+    EXPECT_EQ(lines[i].at("image_quality").at("contrast_dn"), 20.0 * static_cast<double>(i));
   const json summary = recorder.quality_json();
-  EXPECT_EQ(summary.at("frames"), 19);
-  EXPECT_EQ(summary.at("scored"), 18);
+  EXPECT_EQ(summary.at("frames"), 99);
+  EXPECT_EQ(summary.at("scored"), 98);
   EXPECT_EQ(summary.at("without_score").at("nothing"), 1);
   EXPECT_EQ(summary.at("worst_frame"), 1);  // the dimmest
   EXPECT_EQ(summary.at("median_contrast_sigma"),
-            lines[10].at("image_quality").at("contrast_sigma"));
+            lines[50].at("image_quality").at("contrast_sigma"));
   const std::string csv = content_of(folder.path() / "quality.csv");
-  EXPECT_EQ(std::ranges::count(csv, '\n'), 20);  // with its header
+  EXPECT_EQ(std::ranges::count(csv, '\n'), 100);  // with its header
   EXPECT_EQ(csv.find("nan"), std::string::npos);
 }
 

@@ -19,7 +19,7 @@ constexpr double kRounding_dn2 = 1.0 / 12.0;
 constexpr int kLargeTile_px = 32;
 constexpr int kLargeStep = 4;
 constexpr int kSmallTile_px = 16;
-constexpr std::int64_t kSmallFrame_px = 512 * 512;
+constexpr std::int64_t kSmallFrame_px = 262'144;  // 512 x 512
 // Share of all tiles that have the level of the darkest.
 constexpr double kEvenShare = 1.0 / 7.0;
 // A rough tile's exact roughness does not matter; that its squares fit in 32 bits does.
