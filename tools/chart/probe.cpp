@@ -49,6 +49,7 @@ Probe try_setting(const ChartScene& scene, const std::vector<std::string>& sets,
   const engine::CameraGeometry& camera = scenario.scene.camera;
   Probe probe{.cpu_ms = {},
               .wall_ms = {},
+              .stages = {},
               .set_up_s = wall_s() - begun_s,
               .light = LightStack(camera.width_px, camera.height_px, scenario.detector.full_well_e),
               .report = {},
@@ -67,6 +68,7 @@ Probe try_setting(const ChartScene& scene, const std::vector<std::string>& sets,
     if (k >= spec.before && k < moving) {
       probe.cpu_ms.push_back(1e3 * (cpu_s() - cpu));
       probe.wall_ms.push_back(1e3 * (wall_s() - wall));
+      probe.stages.push_back(probe.report.times);
     }
     if (k >= moving) probe.light.add(chain.light(), to_e);
   }

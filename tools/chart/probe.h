@@ -23,6 +23,7 @@ struct ProbeSpec {
 struct Probe {
   std::vector<double> cpu_ms;   ///< of each timed frame, all threads together
   std::vector<double> wall_ms;  ///< of the same
+  std::vector<engine::StageTimes> stages;
   double set_up_s = 0;
   LightStack light;
   engine::FrameReport report;  ///< of the last frame

@@ -221,6 +221,22 @@ int run_command(int argc, char** argv) {
       ->capture_default_str();
   chart_app->add_flag("-q,--quiet", chart.quiet, "a line for each scene only");
 
+  starloop::BudgetOptions budget;
+  CLI::App* budget_app = app.add_subcommand(
+      "budget", "Say before a run what frames will cost here, and how far off they will be");
+  add_common(*budget_app, common);
+  budget_app
+      ->add_option("--time", budget.times_s,
+                   "shutter opens, seconds after the epoch; several, with commas; default: five of "
+                   "the pass")
+      ->delimiter(',')
+      ->expected(1, 64)
+      ->allow_extra_args(false)
+      ->check(CLI::Range(0.0, 9e9));
+  budget_app->add_flag("--no-errors", budget.without_errors,
+                       "times only: errors need a reference, which takes seconds");
+  budget_app->add_flag("--json", budget.as_json, "print an object");
+
   starloop::QualityOptions quality;
   CLI::App* quality_app = app.add_subcommand(
       "quality", "Score pictures without knowing what they show: docs/image_quality.md");
@@ -274,6 +290,7 @@ int run_command(int argc, char** argv) {
   if (materials_app->parsed()) return starloop::show_materials(common, materials_folder);
   if (fit_app->parsed()) return starloop::fit_brdf(fit);
   if (run_app->parsed()) return starloop::run_pass(common, run);
+  if (budget_app->parsed()) return starloop::plan_budget(common, budget);
   if (chart_app->parsed()) return starloop::chart_settings(chart);
   if (soak_app->parsed()) return starloop::soak(common, soak);
   if (replay_app->parsed()) return starloop::replay_log(replay);

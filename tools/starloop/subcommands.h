@@ -104,6 +104,15 @@ struct ChartOptions {
 /// and draws them; `out` is a folder.
 int chart_settings(const ChartOptions& options);
 
+struct BudgetOptions {
+  std::vector<double> times_s;  ///< shutter opens; empty: five of the chosen pass
+  bool without_errors = false;  ///< they need a reference, which takes seconds
+  bool as_json = false;
+};
+/// Says before a run what its frames will cost on this machine, what limits the frame rate, and how
+/// far off they will be.
+int plan_budget(const CommonOptions& options, const BudgetOptions& budget);
+
 struct QualityOptions {
   std::vector<std::string> files;  ///< FITS, or grey pictures
   int bits = 11;                   ///< of a pixel
