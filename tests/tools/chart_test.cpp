@@ -130,6 +130,9 @@ TEST(LightError, ASceneWithoutTargetHasNoFigures) {
   EXPECT_EQ(error.lit.px, 0);
   EXPECT_TRUE(std::isnan(error.lit.rho));
   EXPECT_TRUE(std::isnan(error.flux_share));
+  // But all of it is sky, whose stars may be off.
+  EXPECT_EQ(error.sky.px, kSide * kSide);
+  EXPECT_EQ(error.sky.rho, 0.0);
 }
 
 TEST(Knobs, EachRungOfAMixtureIsTakenAsOftenAsAnyOther) {

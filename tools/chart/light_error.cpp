@@ -42,6 +42,7 @@ PixelSorter::PixelSorter(const LightStack& reference, const engine::TruthMask& m
       classes_(at(reference.width()) * at(reference.height()), PixelClass::kElsewhere) {
   const int width = reference.width();
   const int height = reference.height();
+  if (mask.runs().empty()) std::ranges::fill(classes_, PixelClass::kSky);
   for (const engine::TruthMask::Run& run : mask.runs())
     for (int v = std::max(0, run.row - kNear_px); v < std::min(height, run.row + kNear_px + 1); ++v)
       std::fill(classes_.begin() + v * width + std::max(0, run.begin - kNear_px),

@@ -40,7 +40,7 @@ class LightStack {
 /// Which pixels are looked at apart.
 enum class PixelClass : std::uint8_t {
   kElsewhere,  ///< further than 32 px from the target's light
-  kSky,        ///< no light of the target, but near it
+  kSky,        ///< no light of the target, but near it; all of a frame without any
   kLit,        ///< the target's light is above one sigma of the background's noise: truth's mask
   kEdge        ///< of these, where the next pixel differs by more than five sigma of the noise
 };

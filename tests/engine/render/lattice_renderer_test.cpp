@@ -430,10 +430,10 @@ std::vector<float> cells_of(const Radiance& light) {
 TEST(LatticeRenderer, WithoutBouncesForWantOfTimeALightIsADirectOne) {
   const Snapshot snapshot =
       view_from(Vector3d(0.5, 0.4, 0.77).normalized() * kRange_m, {0.9, 0.5, 0.1});
-  Rig all(spec_of(128, 1), telescope(), telescope_materials());
+  Rig all(spec_of(128, 1), telescope_mesh(), telescope_materials());
   RenderSpec direct = spec_of(128);
   direct.lattice_side = 2;
-  Rig none(direct, telescope(), telescope_materials());
+  Rig none(direct, telescope_mesh(), telescope_materials());
   static_cast<void>(all.render(snapshot));  // something is kept by now
   EXPECT_EQ(cells_of(all.render(snapshot, {.shed = Shed::kBounces})),
             cells_of(none.render(snapshot)));
@@ -446,8 +446,8 @@ TEST(LatticeRenderer, WhatIsKeptIsShownAsItStandsForWantOfTimeAndTakenUpAgainAft
   const Snapshot snapshot = view_from(from, {0.9, 0.5, 0.1});
   RenderSpec spec = spec_of(128, 1);
   spec.lattice_side = 4;
-  Rig hasty(spec, telescope(), telescope_materials());
-  Rig patient(spec, telescope(), telescope_materials());
+  Rig hasty(spec, telescope_mesh(), telescope_materials());
+  Rig patient(spec, telescope_mesh(), telescope_materials());
   const double first = sum_of(hasty.render(snapshot));
   static_cast<void>(patient.render(snapshot));
   const std::uint64_t rays = hasty.report.rays;
@@ -462,8 +462,8 @@ TEST(LatticeRenderer, WhatIsKeptIsShownAsItStandsForWantOfTimeAndTakenUpAgainAft
 TEST(LatticeRenderer, AFirstFrameForWhichThereIsNoTimeHasItsLightAllTheSame) {
   const Snapshot snapshot =
       view_from(Vector3d(0.5, 0.4, 0.77).normalized() * kRange_m, {0.9, 0.5, 0.1});
-  Rig rig(spec_of(128, 1), telescope(), telescope_materials());
-  Rig plain(spec_of(128, 1), telescope(), telescope_materials());
+  Rig rig(spec_of(128, 1), telescope_mesh(), telescope_materials());
+  Rig plain(spec_of(128, 1), telescope_mesh(), telescope_materials());
   EXPECT_EQ(cells_of(rig.render(snapshot, {.shed = Shed::kUpkeep})),
             cells_of(plain.render(snapshot)));
 }

@@ -14,6 +14,7 @@
 #include "engine/core/contract.h"
 #include "engine/scene/built_in_targets.h"
 #include "engine/scene/crinkle.h"
+#include "engine/scene/mesh_repair.h"
 
 namespace engine {
 namespace {
@@ -176,6 +177,16 @@ TEST(DescribedTarget, ComplainsWithTheLine) {
   EXPECT_NE(complaint_of("[parts.\"a.b\"]\nshape = \"box\""), "no complaint");
   EXPECT_NE(complaint_of("[parts.a"), "no complaint");
   EXPECT_THROW(static_cast<void>(described_target("no_such.toml")), ConfigError);
+}
+
+TEST(DescribedTarget, OfTheBuiltInOnesNoFaceIsLeftOut) {
+  for (const std::string& name : built_in_targets()) {
+    GroupedMesh grouped = described_target(name);
+    MeshReport report;
+    repair(grouped, {}, report);
+    EXPECT_EQ(report.left_out(), 0U) << name;
+    EXPECT_EQ(report.flipped.count, 0U) << name;
+  }
 }
 
 TEST(DescribedTarget, SurvivesAnyTextCutShort) {
