@@ -63,7 +63,7 @@ struct LightError {
   double centroid_px = std::numeric_limits<double>::quiet_NaN();  ///< of the target's light
 };
 
-/// Sorts pixels by a reference and its mask.
+/// Sorts pixels by a reference, which outlives it, and its mask.
 class PixelSorter {
  public:
   PixelSorter(const LightStack& reference, const engine::TruthMask& mask,
@@ -79,7 +79,7 @@ class PixelSorter {
   [[nodiscard]] ClassError compare(const LightStack& frames, bool (*wanted)(PixelClass)) const;
 
   const LightStack& reference_;
-  const engine::DetectorSpec& detector_;
+  engine::DetectorSpec detector_;
   double dark_e_;
   std::vector<PixelClass> classes_;
 };

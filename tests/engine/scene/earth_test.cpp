@@ -171,7 +171,7 @@ TEST(ReadEarth, KnowsItsModels) {
     const ConfigReader config = ConfigReader::from_text("[earth]\n" + text, "x.toml");
     return read_earth(config.table("earth"));
   };
-  EXPECT_EQ(read("").earthshine, EarthshineModel::kVector);
+  EXPECT_EQ(read("").earthshine, EarthshineModel::kAuto);
   EXPECT_EQ(read("earthshine = \"none\"").earthshine, EarthshineModel::kNone);
   EXPECT_EQ(read("earthshine = \"paper-lamp\"").earthshine, EarthshineModel::kPaperLamp);
   for (const EarthshineModel model : {EarthshineModel::kVector, EarthshineModel::kHarmonics,
