@@ -260,6 +260,19 @@ int run_command(int argc, char** argv) {
   ladders_app->add_option("-o,--out", ladders.out, "folder that gets table, frames and picture")
       ->capture_default_str();
 
+  starloop::SelftestOptions selftest;
+  CLI::App* selftest_app = app.add_subcommand(
+      "selftest", "Measure plain methods and ours where methods fail; exit 1 when ours does");
+  bool numerical_corners = true;
+  selftest_app->add_flag("--corners", numerical_corners,
+                         "numerical corners: all there is, and the default");
+  selftest_app->add_flag("--explain", selftest.explain,
+                         "what is measured, and each bound's source");
+  selftest_app->add_flag("--json", selftest.as_json, "print an array of objects");
+  selftest_app
+      ->add_option("--bounds", selftest.bounds, "times each bound: below 1 something must fail")
+      ->check(CLI::NonNegativeNumber);
+
   starloop::SoakOptions soak;
   CLI::App* soak_app = app.add_subcommand(
       "soak", "Fly a pass over and over; exit 1 when anything slips, grows or gets lost");
@@ -292,6 +305,7 @@ int run_command(int argc, char** argv) {
   if (run_app->parsed()) return starloop::run_pass(common, run);
   if (budget_app->parsed()) return starloop::plan_budget(common, budget);
   if (chart_app->parsed()) return starloop::chart_settings(chart);
+  if (selftest_app->parsed()) return starloop::test_corners(selftest);
   if (soak_app->parsed()) return starloop::soak(common, soak);
   if (replay_app->parsed()) return starloop::replay_log(replay);
   if (orbits_app->parsed()) return starloop::compare_orbits(common, orbits);

@@ -140,6 +140,15 @@ struct RunOptions {
 /// Runs a pass as a loop.
 int run_pass(const CommonOptions& options, RunOptions run);
 
+struct SelftestOptions {
+  bool as_json = false;
+  bool explain = false;  ///< where each bound comes from
+  double bounds = 1;     ///< times each bound
+};
+/// Tries methods where they fail, the plain ones and ours, and prints both errors and the bound
+/// that ours must keep. All there is to test.
+int test_corners(const SelftestOptions& options);
+
 struct SoakOptions {
   double minutes = 10;
   std::string out = "out";

@@ -1,0 +1,9 @@
+#include "tools/selftest/corner.h"
+
+namespace corners {
+
+std::vector<Room> all_corners() {
+  return {kepler_corners(), orbit_corners(), visibility_corners(), attitude_corners()};
+}
+
+}  // namespace corners
