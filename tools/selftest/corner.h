@@ -35,6 +35,8 @@ struct Room {
 [[nodiscard]] Room orbit_corners();
 [[nodiscard]] Room visibility_corners();
 [[nodiscard]] Room attitude_corners();
+[[nodiscard]] Room detector_corners();
+[[nodiscard]] Room loop_corners();
 
 /// All of them, in the order of the data's flow. Takes seconds.
 [[nodiscard]] std::vector<Room> all_corners();
