@@ -35,6 +35,8 @@ struct Room {
 [[nodiscard]] Room orbit_corners();
 [[nodiscard]] Room visibility_corners();
 [[nodiscard]] Room attitude_corners();
+[[nodiscard]] Room scene_corners();
+[[nodiscard]] Room render_corners();
 [[nodiscard]] Room detector_corners();
 [[nodiscard]] Room loop_corners();
 
