@@ -24,7 +24,7 @@ json rows() { return json::parse(table_as_json().out); }
 
 TEST(Corners, AreAllWithinTheirBounds) {
   EXPECT_EQ(table_as_json().exit_code, 0) << table_as_json().err;
-  EXPECT_GE(rows().size(), 49U);
+  EXPECT_GE(rows().size(), 55U);
   for (const json& row : rows()) EXPECT_TRUE(row["ok"].get<bool>()) << row.dump(2);
 }
 

@@ -37,6 +37,7 @@ struct Room {
 [[nodiscard]] Room attitude_corners();
 [[nodiscard]] Room scene_corners();
 [[nodiscard]] Room render_corners();
+[[nodiscard]] Room optics_corners();
 [[nodiscard]] Room detector_corners();
 [[nodiscard]] Room loop_corners();
 
