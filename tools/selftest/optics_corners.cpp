@@ -195,11 +195,11 @@ Corner smear() {
       "ten places of the exposure",
       unevenness(copies),
       unevenness(streak),
-      5e-3,
+      1e-3,
       "of it",
-      "How uneven the middle of an even streak is, (most - least) / (most + least). Waves beyond "
-      "the cutoff do not pass: places .865 px apart do. The bound: 11 px from an end .02 of the "
-      "light is missing, and .01 where the middle is."};
+      "How uneven the middle of an even streak is, (most - least) / (most + least): waves beyond "
+      "the cutoff do not pass, so copies .865 px apart would do. The bound is what the wings "
+      "miss beyond the ends, .0407 / (2 r^2) of the light at 11 px, 2e-4, five times."};
 }
 
 /// A disc .3 px wide on 3 x 3 cells to a pixel, each asked at its middle: how much light it has.
