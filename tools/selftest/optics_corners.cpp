@@ -66,8 +66,7 @@ class Frequencies {
     double sum = 0;
     for (int j = 0; j < steps_; ++j) {
       double row = 0;
-      for (int i = 0; i < steps_; ++i)
-        row += otf_[static_cast<std::size_t>(j * steps_ + i)] * std::cos(2.0 * kPi * at(i) * du);
+      for (int i = 0; i < steps_; ++i) row += otf_[index(i, j)] * std::cos(2.0 * kPi * at(i) * du);
       sum += row * std::cos(2.0 * kPi * at(j) * dv);
     }
     return 4.0 * step_ * step_ * sum;
@@ -75,6 +74,10 @@ class Frequencies {
 
  private:
   [[nodiscard]] double at(int i) const { return (i + 0.5) * step_; }
+  [[nodiscard]] std::size_t index(int i, int j) const {
+    return static_cast<std::size_t>(j) * static_cast<std::size_t>(steps_) +
+           static_cast<std::size_t>(i);
+  }
   double step_;
   int steps_;
   std::vector<double> otf_;
