@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include "engine/core/constants.h"
 
@@ -37,25 +38,36 @@ Vector3f HemisphereBins::direction(std::size_t bin, float a, float b) noexcept {
   return {r * std::cos(phi), r * std::sin(phi), std::sqrt(std::max(0.0F, 1.0F - r * r))};
 }
 
-void HemisphereBins::see(const EarthLight& cap, const Eigen::Matrix3f& axes,
-                         FineValues& out) noexcept {
-  const Eigen::Matrix3f to_body = axes.transpose();
+namespace {
+
+/// Where see() looks, by quarter of a bin.
+const std::array<Vector3f, std::tuple_size_v<HemisphereBins::FineValues>> kLooks = [] {
+  std::array<Vector3f, std::tuple_size_v<HemisphereBins::FineValues>> looks;
   // Places at the same height in each would meet the limb all at once: R2 of Roberts 2018 spreads
   // them.
   constexpr std::array<float, 2> kSteps = {0.75487767F, 0.56984029F};
   float a = 0.25F;
   float b = 0.75F;
-  for (std::size_t bin = 0; bin < kBins; ++bin) {
+  for (std::size_t bin = 0; bin < HemisphereBins::kBins; ++bin) {
     for (const float half_a : {0.0F, 0.5F}) {
       for (const float half_b : {0.0F, 0.5F}) {
         a += kSteps[0] - (a + kSteps[0] < 1.0F ? 0.0F : 1.0F);
         b += kSteps[1] - (b + kSteps[1] < 1.0F ? 0.0F : 1.0F);
-        const Vector3f local = direction(bin, half_a + 0.5F * a, half_b + 0.5F * b);
-        out[fine(bin, half_a, half_b)] =
-            static_cast<float>(cap.radiance_w_m2_sr((to_body * local).cast<double>()));
+        looks[HemisphereBins::fine(bin, half_a, half_b)] =
+            HemisphereBins::direction(bin, half_a + 0.5F * a, half_b + 0.5F * b);
       }
     }
   }
+  return looks;
+}();
+
+}  // namespace
+
+void HemisphereBins::see(const EarthLight& cap, const Eigen::Matrix3f& axes,
+                         FineValues& out) noexcept {
+  const Eigen::Matrix3f to_body = axes.transpose();
+  for (std::size_t i = 0; i < out.size(); ++i)
+    out[i] = static_cast<float>(cap.radiance_w_m2_sr((to_body * kLooks[i]).cast<double>()));
 }
 
 BinnedBrdf::BinnedBrdf(const Brdf& brdf)

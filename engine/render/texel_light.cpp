@@ -312,6 +312,8 @@ void TexelLight::weigh(const TexelGrid::Texel& texel, const Snapshot& snapshot,
       (snapshot.camera.m - place.place.cast<double>()).normalized().cast<float>();
   const Vector3f out = TexelRays::axes_of(place.normal) * to_camera;
   reflection.facing = out.z() > 0.0F;
+  reflection.sees_earth = false;
+  if (!reflection.facing) return;
   const BinnedBrdf& brdf = body_light_.binned(place.material);
   if (brdf.even()) {
     reflection.weights.fill(brdf.even_share());
@@ -324,8 +326,7 @@ void TexelLight::weigh(const TexelGrid::Texel& texel, const Snapshot& snapshot,
 /// Over a body all look at the same Earth.
 void TexelLight::reflect_earth(const EarthLight& earth, const Vector3f& normal,
                                Reflection& reflection) const noexcept {
-  reflection.sees_earth = false;
-  if (earth.dark() || !reflection.facing) return;
+  if (earth.dark()) return;
   HemisphereBins::FineValues light;
   HemisphereBins::see(earth, TexelRays::axes_of(normal), light);
   for (std::size_t bin = 0; bin < kRays; ++bin) {
