@@ -63,19 +63,21 @@ TexelLight::TexelLight(const TracedTarget& target, const BodyLight& body_light, 
       rays_(target, grid_, further_ ? &body_light.patches() : nullptr),
       first_of_(grid_.most_texels(), kNone),
       asked_(grid_.most_texels(), 0),
-      sent_(2 * target.mesh.triangles.size(), 0.0F) {
+      sent_(2 * target.mesh.triangles.size(), 0.0F),
+      lamp_turns_(kMostTurned_rad),
+      cap_(target) {
   states_.reserve(TexelRays::kMostSets);
   own_.reserve(TexelRays::kMostSets);
   values_.reserve(TexelRays::kMostSets);
   shown_.reserve(TexelRays::kMostSets);
   wanted_.reserve(TexelRays::kMostSets);
-  toward_lamp_.fill(Vector3f::Zero());
 }
 
 void TexelLight::start_over(float texel_m) noexcept {
   texel_m_ = grid_.cut(texel_m);
   if (texel_m_ > texel_m) least_m_ = texel_m_;
   rays_.clear();
+  cap_.clear();
   states_.clear();
   own_.clear();
   values_.clear();
@@ -110,6 +112,7 @@ bool TexelLight::make_asked(bool all) noexcept {
 
 void TexelLight::keep(const TexelGrid::Texel& texel, std::uint32_t number) noexcept {
   rays_.add(texel, number);
+  cap_.keep(2 * texel.facet + texel.side);
   const std::uint32_t material = target_.facets.on_side(texel.facet, 0, 0, 0).material;
   states_.push_back({.lit_in = frame_, .even = body_light_.binned(material).even()});
   own_.push_back({});
@@ -176,10 +179,10 @@ bool TexelLight::update(const Snapshot& snapshot, const LampInView& lamp, double
   const Lamp& light = *lamps_of(snapshot)[lamp.index];
   irradiance_w_m2_ = static_cast<float>(light.irradiance_w_m2);
   // Another lamp is one that has turned.
-  if (std::exchange(lamp_, lamp.index) != lamp.index) toward_lamp_.fill(Vector3f::Zero());
-  toward_lamp_[frame_ % kTurns] = light.toward.unit.cast<float>();
+  if (std::exchange(lamp_, lamp.index) != lamp.index) lamp_turns_.forget();
+  lamp_turns_.note(frame_, light.toward.unit.cast<float>());
   light_sides(snapshot, lamp.index, pool);
-  note_turned();
+  cap_.renew(frame_, snapshot.earth, pool);
 
   const std::size_t n = rays_.size();
   const int shares = static_cast<int>((n + kKeptAShare - 1) / kKeptAShare);
@@ -197,14 +200,6 @@ bool TexelLight::update(const Snapshot& snapshot, const LampInView& lamp, double
   return !had_room || (all_rays && n > before);
 }
 
-void TexelLight::note_turned() noexcept {
-  for (std::size_t f = 0; f < kTurns; ++f) {
-    const float turned = (toward_lamp_[f] - toward_lamp_[frame_ % kTurns]).squaredNorm();
-    // A direction that is no number has turned.
-    turned_[f] = !(turned < kMostTurned_rad * kMostTurned_rad);
-  }
-}
-
 void TexelLight::tend(std::size_t first, std::size_t end, const Snapshot& snapshot,
                       const LampInView& lamp, bool all_rays) noexcept {
   const std::uint64_t changed = rays_.send(first, end, snapshot.camera, all_rays);
@@ -218,9 +213,9 @@ void TexelLight::renew(std::size_t k, bool changed, const Snapshot& snapshot,
   State& state = states_[k];
   // Neighbours at once: they lie side by side in memory.
   const auto phase = static_cast<std::uint32_t>(k / kKeptAShare) + frame_;
-  if (changed || phase % kTurns == 0 || turned_[state.lit_in % kTurns]) {
+  if (changed || phase % RecentTurns::kFrames == 0 || lamp_turns_.since(state.lit_in)) {
     state.lit_in = frame_;
-    rays_.ask_lamp(k, lamp.view, toward_lamp_[frame_ % kTurns], sent_);
+    rays_.ask_lamp(k, lamp.view, lamp_turns_.now(), sent_);
     changed = true;
   }
   state.summed = changed || phase % (state.even ? kSumEvenEvery : kSumEvery) == 0;
@@ -327,8 +322,11 @@ void TexelLight::weigh(const TexelGrid::Texel& texel, const Snapshot& snapshot,
 void TexelLight::reflect_earth(const EarthLight& earth, const Vector3f& normal,
                                Reflection& reflection) const noexcept {
   if (earth.dark()) return;
-  HemisphereBins::FineValues light;
-  HemisphereBins::see(earth, TexelRays::axes_of(normal), light);
+  const CapLight::Kept* const kept = cap_.of(reflection.side);
+  if (kept != nullptr && kept->dark) return;
+  HemisphereBins::FineValues seen;
+  if (kept == nullptr) HemisphereBins::see(earth, TexelRays::axes_of(normal), seen);
+  const HemisphereBins::FineValues& light = kept != nullptr ? kept->w_m2_sr : seen;
   for (std::size_t bin = 0; bin < kRays; ++bin) {
     float sum = 0.0F;
     for (const float a : {0.0F, 0.5F}) {

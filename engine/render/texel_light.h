@@ -10,7 +10,9 @@
 
 #include "engine/core/worker_pool.h"
 #include "engine/render/body_light.h"
+#include "engine/render/cap_light.h"
 #include "engine/render/lamp_view.h"
+#include "engine/render/recent_turns.h"
 #include "engine/render/texel_rays.h"
 #include "engine/scene/snapshot.h"
 
@@ -93,7 +95,6 @@ class TexelLight {
 
  private:
   static constexpr std::size_t kRays = TexelRays::kRays;
-  static constexpr std::uint32_t kTurns = 64;
 
   /// To the camera.
   struct Value {
@@ -131,7 +132,6 @@ class TexelLight {
   void combine(std::size_t first, std::size_t end) noexcept;
   void smooth(std::size_t first, std::size_t end, bool all) noexcept;
   void light_sides(const Snapshot& snapshot, std::size_t lamp, WorkerPool& pool) noexcept;
-  void note_turned() noexcept;
   void tend(std::size_t first, std::size_t end, const Snapshot& snapshot, const LampInView& lamp,
             bool all_rays) noexcept;
   void renew(std::size_t k, bool changed, const Snapshot& snapshot, const LampInView& lamp,
@@ -152,16 +152,16 @@ class TexelLight {
   float texel_m_ = 0;
   float least_m_ = 0;  ///< there is no room for finer texels
   TexelRays rays_;
-  std::vector<std::uint32_t> first_of_;              ///< set of rays, by texel
-  std::vector<std::uint8_t> asked_;                  ///< by texel
-  std::vector<State> states_;                        ///< by set
-  std::vector<Value> own_;                           ///< by set, of its rays alone
-  std::vector<Value> values_;                        ///< of all sets, where it is the first
-  std::vector<Value> shown_;                         ///< the same, smoothed
-  std::vector<std::uint8_t> wanted_;                 ///< by set, as asked_
-  std::vector<float> sent_;                          ///< by 2 * facet + side, for 1 W/m^2
-  std::array<Eigen::Vector3f, kTurns> toward_lamp_;  ///< of the last frames
-  std::array<bool, kTurns> turned_{};                ///< of these: too far since
+  std::vector<std::uint32_t> first_of_;  ///< set of rays, by texel
+  std::vector<std::uint8_t> asked_;      ///< by texel
+  std::vector<State> states_;            ///< by set
+  std::vector<Value> own_;               ///< by set, of its rays alone
+  std::vector<Value> values_;            ///< of all sets, where it is the first
+  std::vector<Value> shown_;             ///< the same, smoothed
+  std::vector<std::uint8_t> wanted_;     ///< by set, as asked_
+  std::vector<float> sent_;              ///< by 2 * facet + side, for 1 W/m^2
+  RecentTurns lamp_turns_;
+  CapLight cap_;
   std::size_t refine_from_ = 0;
   std::uint32_t frame_ = 0;
   std::size_t lamp_ = 0;
