@@ -27,8 +27,12 @@ constexpr std::uint32_t kMostSets = 8;
 constexpr std::size_t kMadeAFrame = 8192;
 constexpr std::uint32_t kNumberBits = 28;
 constexpr float kMostTurned_rad = 8e-3F;
+// What is due to be summed up is so in one of so many frames.
 constexpr std::uint32_t kSumEvery = 4;
-constexpr std::uint32_t kSumEvenEvery = 16;
+// The camera's turn: lobes kept by bins are some 15 deg wide, and evenly sent light ends at 90 deg.
+constexpr auto kLobeTurned_rad = static_cast<float>(1.0 * kDegree);
+constexpr auto kEvenTurned_rad = static_cast<float>(3.0 * kDegree);
+constexpr std::uint32_t kAwake = 16;  // frames
 // Of 8 rays over the distance that they went, and less for more.
 constexpr float kReachOfOne = 8.0F * 0.15F;
 
@@ -65,12 +69,15 @@ TexelLight::TexelLight(const TracedTarget& target, const BodyLight& body_light, 
       asked_(grid_.most_texels(), 0),
       sent_(2 * target.mesh.triangles.size(), 0.0F),
       lamp_turns_(kMostTurned_rad),
+      camera_turns_(kLobeTurned_rad),
+      camera_even_turns_(kEvenTurned_rad),
       cap_(target) {
   states_.reserve(TexelRays::kMostSets);
   own_.reserve(TexelRays::kMostSets);
   values_.reserve(TexelRays::kMostSets);
   shown_.reserve(TexelRays::kMostSets);
   wanted_.reserve(TexelRays::kMostSets);
+  looked_at_.reserve(TexelRays::kMostSets);
 }
 
 void TexelLight::start_over(float texel_m) noexcept {
@@ -83,6 +90,7 @@ void TexelLight::start_over(float texel_m) noexcept {
   values_.clear();
   shown_.clear();
   wanted_.clear();
+  looked_at_.clear();
   refine_from_ = 0;
   std::fill_n(first_of_.begin(), grid_.texels(), kNone);
   std::fill_n(asked_.begin(), grid_.texels(), std::uint8_t{0});
@@ -105,20 +113,25 @@ bool TexelLight::make_asked(bool all) noexcept {
     const auto number = static_cast<std::uint32_t>(next - begin);
     asked_[number] = 0;
     first_of_[number] = static_cast<std::uint32_t>(rays_.size());
-    keep(grid_.texel(number), number);
+    keep(grid_.texel(number), number, first_of_[number]);
   }
   return true;
 }
 
-void TexelLight::keep(const TexelGrid::Texel& texel, std::uint32_t number) noexcept {
+void TexelLight::keep(const TexelGrid::Texel& texel, std::uint32_t number,
+                      std::uint32_t first) noexcept {
   rays_.add(texel, number);
   cap_.keep(2 * texel.facet + texel.side);
   const std::uint32_t material = target_.facets.on_side(texel.facet, 0, 0, 0).material;
-  states_.push_back({.lit_in = frame_, .even = body_light_.binned(material).even()});
+  states_.push_back({.lit_in = frame_,
+                     .looked_at_in = frame_,
+                     .first = first,
+                     .even = body_light_.binned(material).even()});
   own_.push_back({});
   values_.push_back({});
   shown_.push_back({});
   wanted_.push_back(0);
+  looked_at_.push_back(0);
 }
 
 /// Further sets for texels that have done with theirs, while there is room.
@@ -133,8 +146,21 @@ void TexelLight::make_wanted() noexcept {
     if (sets == kMostSets || rays_.progress(last).sent != kRays) continue;
     states_[last].next = static_cast<std::uint32_t>(rays_.size());
     const TexelRays::Set& own = rays_.set(k);
-    keep(TexelGrid::Texel(own.texel), own.number + (sets << kNumberBits));
-    states_.back().first = false;
+    keep(TexelGrid::Texel(own.texel), own.number + (sets << kNumberBits),
+         static_cast<std::uint32_t>(k));
+  }
+}
+
+bool TexelLight::awake(std::size_t first) const noexcept {
+  return frame_ - states_[first].looked_at_in <= kAwake;
+}
+
+void TexelLight::note_looks(std::size_t first, std::size_t end) noexcept {
+  for (std::size_t k = first; k < end; ++k) {
+    states_[k].back = false;
+    if (std::exchange(looked_at_[k], std::uint8_t{0}) == 0) continue;
+    states_[k].back = !awake(k);
+    states_[k].looked_at_in = frame_;
   }
 }
 
@@ -144,8 +170,9 @@ void TexelLight::choose_due() noexcept {
   std::size_t left = kRefinedAFrame + n / kRefinedOf;
   for (std::size_t i = 0; i < n && left > 0; ++i) {
     if (refine_from_ >= n) refine_from_ = 0;
-    TexelRays::Progress& progress = rays_.progress(refine_from_++);
-    if (progress.done()) continue;
+    const std::size_t set = refine_from_++;
+    TexelRays::Progress& progress = rays_.progress(set);
+    if (progress.done() || !awake(states_[set].first)) continue;
     progress.due = true;
     --left;
   }
@@ -174,7 +201,6 @@ bool TexelLight::update(const Snapshot& snapshot, const LampInView& lamp, double
   const std::size_t before = rays_.size();
   const bool had_room = make_asked(all_rays);
   make_wanted();
-  choose_due();
   ++frame_;
   const Lamp& light = *lamps_of(snapshot)[lamp.index];
   irradiance_w_m2_ = static_cast<float>(light.irradiance_w_m2);
@@ -183,6 +209,9 @@ bool TexelLight::update(const Snapshot& snapshot, const LampInView& lamp, double
   lamp_turns_.note(frame_, light.toward.unit.cast<float>());
   light_sides(snapshot, lamp.index, pool);
   cap_.renew(frame_, snapshot.earth, pool);
+  const Vector3f to_camera = snapshot.camera.m.normalized().cast<float>();
+  camera_turns_.note(frame_, to_camera);
+  camera_even_turns_.note(frame_, to_camera);
 
   const std::size_t n = rays_.size();
   const int shares = static_cast<int>((n + kKeptAShare - 1) / kKeptAShare);
@@ -192,6 +221,8 @@ bool TexelLight::update(const Snapshot& snapshot, const LampInView& lamp, double
       work(first, std::min(n, first + kKeptAShare));
     });
   };
+  each_share([&](std::size_t first, std::size_t end) { note_looks(first, end); });
+  choose_due();
   each_share(
       [&](std::size_t first, std::size_t end) { tend(first, end, snapshot, lamp, all_rays); });
   each_share([&](std::size_t first, std::size_t end) { combine(first, end); });
@@ -211,6 +242,8 @@ void TexelLight::tend(std::size_t first, std::size_t end, const Snapshot& snapsh
 void TexelLight::renew(std::size_t k, bool changed, const Snapshot& snapshot,
                        const LampInView& lamp, Reflection& reflection) noexcept {
   State& state = states_[k];
+  state.summed = false;
+  if (!changed && !awake(state.first)) return;
   // Neighbours at once: they lie side by side in memory.
   const auto phase = static_cast<std::uint32_t>(k / kKeptAShare) + frame_;
   if (changed || phase % RecentTurns::kFrames == 0 || lamp_turns_.since(state.lit_in)) {
@@ -218,8 +251,11 @@ void TexelLight::renew(std::size_t k, bool changed, const Snapshot& snapshot,
     rays_.ask_lamp(k, lamp.view, lamp_turns_.now(), sent_);
     changed = true;
   }
-  state.summed = changed || phase % (state.even ? kSumEvenEvery : kSumEvery) == 0;
+  const RecentTurns& turns = state.even ? camera_even_turns_ : camera_turns_;
+  const bool turn = phase % kSumEvery == 0 || states_[state.first].back;
+  state.summed = changed || (turn && turns.since(state.summed_in));
   if (!state.summed) return;
+  state.summed_in = frame_;
   weigh(rays_.set(k).texel, snapshot, reflection);
   own_[k].of_lamp = of_lamp(k, reflection);
   own_[k].of_earth_w_m2_sr = of_earth(k, reflection);
@@ -229,7 +265,12 @@ void TexelLight::renew(std::size_t k, bool changed, const Snapshot& snapshot,
 /// The mean over a texel's sets, by their rays.
 void TexelLight::combine(std::size_t first, std::size_t end) noexcept {
   for (std::size_t k = first; k < end; ++k) {
-    if (!states_[k].first) continue;
+    if (states_[k].first != k) continue;
+    bool summed = false;
+    for (std::size_t set = k; set != kNone; set = states_[set].next)
+      summed = summed || states_[set].summed;
+    states_[k].summed = summed;
+    if (!summed) continue;
     values_[k] = own_[k];
     values_[k].noise_of_one = own_[k].noise;
     values_[k].rays = static_cast<float>(rays_.progress(k).sent);
@@ -261,7 +302,7 @@ void TexelLight::combine(std::size_t first, std::size_t end) noexcept {
 /// Of those that were summed up, by their rays.
 void TexelLight::smooth(std::size_t first, std::size_t end, bool all) noexcept {
   for (std::size_t k = first; k < end; ++k) {
-    if (!states_[k].first || !(states_[k].summed || all)) continue;
+    if (states_[k].first != k || !(states_[k].summed || all)) continue;
     const Value& own = values_[k];
     shown_[k] = own;
     // Texels of a side stand no closer than half the width that was asked for.
@@ -270,7 +311,7 @@ void TexelLight::smooth(std::size_t first, std::size_t end, bool all) noexcept {
     float squares = 0.0F;
     const auto add = [&](std::uint32_t texel, float distance2_m2) {
       const std::uint32_t near = first_of_[texel];
-      if (near == kNone) return;
+      if (near == kNone || !awake(near)) return;
       const Value& value = values_[near];
       // Near to both: what is bright close to a corner would else be added where it is not, and
       // stay where it is. A reach that is no number has no rays either.

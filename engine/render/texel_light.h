@@ -26,9 +26,10 @@ namespace engine {
 /// others' light is BodyLight's until then. It begins
 /// with eight of its rays and gets the others as frames go by, and when it has all and is wanted
 /// better a further set, up to eight. Which of the places met are in the light is asked anew when
-/// the lamp has turned by 8 mrad or 64 frames have passed; what goes to the camera is summed up
-/// every fourth frame, or every sixteenth where all directions are alike. So a frame depends on
-/// those before it, and on nothing else: neither on threads nor on a clock.
+/// the lamp has turned by 8 mrad or 64 frames have passed. What goes to the camera is summed up in
+/// every fourth frame if the camera has turned by 1 deg since, or 3 deg where all directions are
+/// alike. Of texels that no pixel has looked at for 16 frames nothing is done. So a frame depends
+/// on those before it, and on nothing else: neither on threads nor on a clock.
 /// Light from other surfaces changes over a share of their distance, so what is shown is the mean
 /// over the texels of the same side that are near to each other. While a texel has eight rays that
 /// is .15 of the harmonic mean distance that they went (the measure of Ward, Rubinstein and Clear
@@ -72,6 +73,8 @@ class TexelLight {
     const std::uint32_t kept = first_of_[texel];
     if (kept != kNone) {
       const Value& value = shown_[kept];
+      const std::atomic_ref looked(looked_at_[kept]);
+      if (looked.load(std::memory_order_relaxed) == 0) looked.store(1, std::memory_order_relaxed);
       return {irradiance_w_m2_ * value.of_lamp + value.of_earth_w_m2_sr,
               irradiance_w_m2_ * value.noise,
               irradiance_w_m2_ * value.noise_of_one,
@@ -109,11 +112,14 @@ class TexelLight {
   };
   /// What says whether there is anything to do: apart, for it is looked at in each frame.
   struct State {
-    std::uint32_t lit_in = 0;    ///< frame
-    std::uint32_t next = kNone;  ///< a further set of the same texel's
-    bool even = false;           ///< BinnedBrdf::even()
-    bool first = true;           ///< of its texel's sets
-    bool summed = false;         ///< in this frame
+    std::uint32_t lit_in = 0;        ///< frame
+    std::uint32_t summed_in = 0;     ///< frame
+    std::uint32_t looked_at_in = 0;  ///< frame; of its texel's first set
+    std::uint32_t first = kNone;     ///< of its texel's sets
+    std::uint32_t next = kNone;      ///< a further one
+    bool even = false;               ///< BinnedBrdf::even()
+    bool back = false;               ///< of the first: looked at again, after a while
+    bool summed = false;             ///< in this frame
   };
   /// How the last side that a thread was at reflects to the camera.
   struct Reflection {
@@ -127,8 +133,11 @@ class TexelLight {
   void start_over(float texel_m) noexcept;
   [[nodiscard]] bool make_asked(bool all) noexcept;
   void make_wanted() noexcept;
-  void keep(const TexelGrid::Texel& texel, std::uint32_t number) noexcept;
+  void keep(const TexelGrid::Texel& texel, std::uint32_t number, std::uint32_t first) noexcept;
   void choose_due() noexcept;
+  void note_looks(std::size_t first, std::size_t end) noexcept;
+  /// Of a texel's first set.
+  [[nodiscard]] bool awake(std::size_t first) const noexcept;
   void combine(std::size_t first, std::size_t end) noexcept;
   void smooth(std::size_t first, std::size_t end, bool all) noexcept;
   void light_sides(const Snapshot& snapshot, std::size_t lamp, WorkerPool& pool) noexcept;
@@ -160,7 +169,10 @@ class TexelLight {
   std::vector<Value> shown_;             ///< the same, smoothed
   std::vector<std::uint8_t> wanted_;     ///< by set, as asked_
   std::vector<float> sent_;              ///< by 2 * facet + side, for 1 W/m^2
+  std::vector<std::uint8_t> looked_at_;  ///< by set, since the last update()
   RecentTurns lamp_turns_;
+  RecentTurns camera_turns_;       ///< that show in a lobe
+  RecentTurns camera_even_turns_;  ///< that show elsewhere
   CapLight cap_;
   std::size_t refine_from_ = 0;
   std::uint32_t frame_ = 0;

@@ -8,6 +8,7 @@
 
 #include <gtest/gtest.h>
 
+#include "engine/core/constants.h"
 #include "engine/render/texel_light.h"
 #include "tests/support/scenes.h"
 
@@ -248,8 +249,9 @@ TEST(TexelGrid, CutsNoFinerThanThereIsRoomFor) {
 
 /// Warm: what is asked for is there, with all its rays.
 struct Texels {
-  Texels(const Mesh& mesh, const Snapshot& snapshot)
-      : target(mesh, {lambert_material("grey", 0.5)}),
+  Texels(const Mesh& mesh, const Snapshot& snapshot,
+         const Material& grey = lambert_material("grey", 0.5))
+      : target(mesh, {grey}),
         pool(2),
         body(target, 1, pool),
         view(target.mesh),
@@ -347,6 +349,32 @@ TEST(TexelLight, ManyAreMadeInSeveralFramesThoughAskedForOnce) {
   EXPECT_GT(sizes[1], sizes[0]);
   EXPECT_LE(sizes[1], 2U * 8192U);
   EXPECT_EQ(sizes[5], sizes[4]);
+}
+
+TEST(TexelLight, OneThatIsLookedAtAgainIsUpToDateInTheNextFrame) {
+  // Its lobe is wide enough to be kept by bins.
+  Material foil{"grey", test_support::polyimide()};
+  foil.wrinkle_rad = 15.0 * kDegree;
+  Texels always(corner(), before_the_wall(), foil);
+  Texels sometimes(corner(), before_the_wall(), foil);
+  constexpr std::uint32_t kWall = 2;
+  const auto look = [](Texels& texels) { return texels.light.at(kWall, 0, 0.3F, 0.3F).w_m2_sr; };
+  (void)always.at(kWall, 0.3F, 0.3F);
+  (void)sometimes.at(kWall, 0.3F, 0.3F);
+  const auto frame_from = [](Texels& texels, double angle_rad) {
+    texels.seen = before_the_wall({100e3 * std::cos(angle_rad), 100e3 * std::sin(angle_rad), 3});
+    texels.light.update(texels.seen, {0, texels.view}, Texels::kPx_m, false, texels.pool);
+  };
+  // A degree a frame, and the camera stands still at last.
+  for (int frame = 1; frame <= 50; ++frame) {
+    for (Texels* texels : {&always, &sometimes})
+      frame_from(*texels, std::min(frame, 40) * kPi / 180.0);
+    (void)look(always);
+  }
+  // Nothing was done for it, and the view matters.
+  EXPECT_GT(std::abs(look(sometimes) / look(always) - 1.0F), 0.02F);
+  for (Texels* texels : {&always, &sometimes}) frame_from(*texels, 40.0 * kPi / 180.0);
+  EXPECT_EQ(look(sometimes), look(always));
 }
 
 TEST(TexelLight, MoreTexelsThanThereIsRoomForAreMadeCoarser) {
