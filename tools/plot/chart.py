@@ -77,10 +77,10 @@ def draw_front(axis, rows):
     limit = max((number(r["reference_lit"]) for r in rows if r["reference_lit"]), default=math.nan)
     if math.isfinite(limit) and limit > 0:
         axis.axhspan(LEAST / 2, limit, color="#eef1f5", zorder=0)
-    least = min(error_of(r) for r in rows)
-    axis.set_ylim(bottom=min(0.6 * least, 0.1))
     axis.set_xscale("log")
     axis.set_yscale("log")
+    errors = [error_of(r) for r in rows]
+    axis.set_ylim(min(0.6 * min(errors), 0.1), max(1.7 * max(errors), 1.0))
     axis.set_title(rows[0]["title"] + (" (corner)" if rows[0]["corner"] == "1" else ""),
                    fontsize=10.5, loc="left")
 
