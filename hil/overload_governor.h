@@ -28,7 +28,7 @@ class OverloadGovernor {
 
   /// For the next frame.
   [[nodiscard]] engine::Shed shed() const noexcept { return static_cast<engine::Shed>(step_); }
-  /// What the last one took, from its shutter's opening on.
+  /// What the last one took, from the wake-up at its shutter's opening to its hand-over.
   void saw(engine::Duration busy) noexcept;
 
  private:
@@ -39,8 +39,8 @@ class OverloadGovernor {
   int fitting_ = 0;                ///< frames since the last change
   int patience_ = kLeastPatience;  ///< so many of these, and the finer step is tried
   bool tried_ = false;             ///< the last change was such a trial
-  double before_s_ =
-      0;  ///< of the frame that a step more came after; 0: it is known what it brings
+  /// Of the frame that a step more came after; 0: it is known what that brings.
+  double before_s_ = 0;
   /// Time of a frame at a step over that at the step before.
   std::array<double, engine::kSheds> share_{1, 1, 1, 1};
 };

@@ -22,9 +22,9 @@ namespace hil {
 ///   command   each that was obeyed: from which frame on, sender, its packet (space_packet.h), and
 ///             in full what the packet rounds
 ///   decision  what became of each frame that the loop came to; it stands after all commands up to
-///             that frame, and after how many passes a clock stopped rendering it, and what it
-///             left out because the frames before took too long. Its kind room for what else a
-///             clock may decide
+///             that frame, after how many passes a clock stopped rendering it, and what it
+///             left out because the frames before took too long. Its kind leaves room for what else
+///             a clock may decide
 ///   end       last: the loop's counts. A run that was killed has none
 enum class LogType : std::uint32_t {
   kStart = 1,
