@@ -25,7 +25,6 @@ PortCount end_of(PacketFault fault) noexcept {
 }  // namespace
 
 PacketIntake::Verdict PacketIntake::check(std::span<const std::byte> packet) noexcept {
-  counts_.add(PortCount::kPackets);
   const auto decoded = decode_command(packet, key_ ? &*key_ : nullptr);
   Verdict verdict;
   if (!decoded.ok()) {

@@ -9,19 +9,19 @@ namespace hil {
 
 /// What a command port counts. The numbers are those of protocol.md.
 ///
-/// Every packet that arrives ends in exactly one of the first ten: they add up to kPackets.
+/// Every packet that arrives ends in exactly one of the first ten: kPackets is their sum.
 enum class PortCount : std::uint8_t {
-  kPassedOn = 0,        ///< commands, handed to the loop
-  kPings = 1,           ///< answered
-  kMalformed = 2,       ///< no packet of ours: length, version, type, APID, protocol, flags
-  kChecksum = 3,        ///< damaged
-  kUnsigned = 4,        ///< we have a key, the packet has no signature
-  kBadSignature = 5,    ///< not made with our key, or we have none
-  kReplayed = 6,        ///< signed, with a sequence that is not above all signed before
-  kBadValue = 7,        ///< a number that is none, or out of its range
-  kTooManyClients = 8,  ///< from a UDP endpoint for which there was no place
-  kQueueFull = 9,       ///< the loop did not take them fast enough
-  kPackets = 10,
+  kPassedOn = 0,             ///< commands, handed to the loop
+  kPings = 1,                ///< answered
+  kMalformed = 2,            ///< no packet of ours: length, version, type, APID, protocol, flags
+  kChecksum = 3,             ///< damaged
+  kUnsigned = 4,             ///< we have a key, the packet has no signature
+  kBadSignature = 5,         ///< not made with our key, or we have none
+  kReplayed = 6,             ///< signed, with a sequence that is not above all signed before
+  kBadValue = 7,             ///< a number that is none, or out of its range
+  kTooManyClients = 8,       ///< from a UDP endpoint for which there was no place
+  kQueueFull = 9,            ///< the loop did not take them fast enough
+  kPackets = 10,             ///< not counted: the sum of the ends, at any moment
   kKernelLost = 11,          ///< datagrams that the operating system had no room for
   kConnections = 12,         ///< TCP, taken
   kConnectionsRefused = 13,  ///< TCP, no place
@@ -79,6 +79,8 @@ class PortCounters {
     PortCounts counts;
     for (std::size_t i = 0; i < kPortCounts; ++i)
       counts.values[i] = values_[i].load(std::memory_order_relaxed);
+    for (std::size_t i = 0; i < kPacketEnds; ++i)
+      counts.values[static_cast<std::size_t>(PortCount::kPackets)] += counts.values[i];
     return counts;
   }
 

@@ -100,7 +100,6 @@ bool TcpPort::take_packets(Connection& c) {
   std::span<const std::byte> rest = std::span(c.in).first(c.in_bytes);
   while (rest.size() >= kPrimaryHeaderBytes) {
     if (!may_be_command(rest)) {
-      intake_.counts().add(PortCount::kPackets);
       intake_.counts().add(PortCount::kMalformed);
       return false;
     }

@@ -238,7 +238,7 @@ TEST(CommandPort, WithAKeyOnlyFreshSignedPacketsCount) {
   EXPECT_EQ(port.receive(kPatience).value().sequence, 51U);
   EXPECT_TRUE(answered(udp, 52, &key));
   EXPECT_EQ(port.counts()[PortCount::kPassedOn], 51U);
-  expect_adds_up(port.counts());
+  EXPECT_EQ(port.counts()[PortCount::kPackets], 3U + 50U + 150U + 1U + 1U);
 }
 
 TEST(CommandPort, WithAKeyAStreamThatIsUnsignedOrForgedIsClosed) {

@@ -58,13 +58,6 @@ inline hil::Frame frame(std::uint64_t sequence) {
   return f;
 }
 
-/// Every packet has one end.
-inline void expect_adds_up(const hil::PortCounts& counts) {
-  std::uint64_t ends = 0;
-  for (std::size_t i = 0; i < hil::kPacketEnds; ++i) ends += counts.values[i];
-  EXPECT_EQ(ends, counts[PortCount::kPackets]);
-}
-
 inline std::size_t open_descriptors() {
   std::size_t n = 0;
   DIR* folder = ::opendir("/proc/self/fd");
