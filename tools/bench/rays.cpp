@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
-#include <ctime>
 #include <functional>
 #include <string>
 #include <vector>
@@ -19,29 +18,29 @@
 #include "engine/scene/telescope.h"
 #include "hil/steady_clock.h"
 #include "tools/bench/bare_embree.h"
+#include "tools/bench/image_rays.h"
+#include "tools/bench/least_times.h"
 
 namespace {
 
 using namespace engine;
+using bench::ImageRays;
+using bench::LeastTimes;
+using bench::Packets;
+using bench::rays_of;
 using Eigen::Vector3d;
-using Eigen::Vector3f;
 
 constexpr int kRounds = 9;
 constexpr int kSamples = 50;
 
-double cpu_s() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
-
 /// The least CPU time of each, in turn.
 std::vector<double> least_s(const std::vector<std::function<void()>>& all) {
-  std::vector<double> best(all.size(), 1e9);
-  for (int round = 0; round < kRounds; ++round) {
-    for (std::size_t i = 0; i < all.size(); ++i) {
-      const double start = cpu_s();
-      all[i]();
-      best[i] = std::min(best[i], cpu_s() - start);
-    }
-  }
-  return best;
+  LeastTimes times(all.size());
+  for (int round = 0; round < kRounds; ++round)
+    for (std::size_t i = 0; i < all.size(); ++i) times.time(i, all[i]);
+  std::vector<double> least;
+  for (std::size_t i = 0; i < all.size(); ++i) least.push_back(times.least_s(i));
+  return least;
 }
 
 Snapshot view_of(double range_m) {
@@ -61,72 +60,6 @@ Snapshot view_of(double range_m) {
 
 double range_for(const TracedTarget& target, const CameraGeometry& camera, double pixels_across) {
   return 2.0 * target.bounding_radius_m / (pixels_across * camera.ifov_rad());
-}
-
-/// Rays in packets, in the order in which a renderer would have them.
-class Packets {
- public:
-  void add(const Vector3f& origin, const Vector3f& direction) {
-    if (used_ == RayPacket::kLanes) used_ = 0;
-    if (used_ == 0) all_.emplace_back();
-    all_.back().set(used_++, origin, direction);
-    ++rays_;
-  }
-  [[nodiscard]] const std::vector<RayPacket>& all() const { return all_; }
-  [[nodiscard]] double rays() const { return static_cast<double>(rays_); }
-
- private:
-  std::vector<RayPacket> all_;
-  int used_ = 0;
-  std::size_t rays_ = 0;
-};
-
-struct Kinds {
-  Packets camera;
-  Packets shadow;
-  Packets bounce;
-  Packets bounce_shadow;
-};
-
-Kinds rays_of(const TracedTarget& target, const Snapshot& snapshot, const CameraGeometry& camera) {
-  Kinds kinds;
-  const TracedFrame frame(snapshot, camera, target.bounding_radius_m, 0.0);
-  Footprint footprint(camera, 16, target.mesh.vertices.size());
-  footprint.project(target.mesh, snapshot);
-  const PixelRect region = footprint.region();
-  const Vector3f to_sun = snapshot.sun.toward.unit.cast<float>();
-  RayCounts counts;
-  std::uint32_t number = 0;
-  for (int v = region.top; v < region.bottom; ++v) {
-    for (int u = region.left; u < region.right; ++u) {
-      if (!footprint.marked(u, v)) continue;
-      for (int i = 0; i < kSamples; ++i) {
-        const SampleNumbers numbers(SequenceKind::kSobol, 7, number++);
-        const auto place = numbers.pair(0);
-        const Vector3d d = frame.at_zero + (u - 0.5 + static_cast<double>(place[0])) * frame.per_u +
-                           (v - 0.5 + static_cast<double>(place[1])) * frame.per_v;
-        const Vector3f start = (frame.origin + frame.advance * d).cast<float>();
-        kinds.camera.add(start, d.cast<float>());
-        const MeshHit hit = target.scene.intersect(start, d.cast<float>(), counts);
-        if (hit.triangle == MeshHit::kNone) continue;
-        const SurfacePoint at = target.facets.at(hit, d.cast<float>());
-        kinds.shadow.add(at.start(), to_sun);
-        if (i % 7 != 0) continue;  // one in seven bounces
-        const auto e = numbers.pair(2);
-        const double turn = 2.0 * kPi * static_cast<double>(e[1]);
-        const double sine = std::sqrt(static_cast<double>(e[0]));
-        const Vector3f along =
-            (basis_round(at.normal.cast<double>()).transpose() *
-             Vector3d(sine * std::cos(turn), sine * std::sin(turn), std::sqrt(1.0 - sine * sine)))
-                .cast<float>();
-        kinds.bounce.add(at.start(), along);
-        const MeshHit next = target.scene.intersect(at.start(), along, counts);
-        if (next.triangle == MeshHit::kNone) continue;
-        kinds.bounce_shadow.add(target.facets.at(next, along).start(), to_sun);
-      }
-    }
-  }
-  return kinds;
 }
 
 struct Rates {
@@ -174,9 +107,11 @@ void render_only(const Mesh& mesh, const std::vector<Material>& materials, doubl
   WorkerPool pool(1);
   PathTracer tracer(spec, target, pool);
   Radiance out;
-  const double start = cpu_s();
-  for (int i = 0; i < frames; ++i) static_cast<void>(tracer.render(snapshot, {}, out));
-  std::printf("%.3f CPU-ms a frame\n", (cpu_s() - start) / frames * 1e3);
+  LeastTimes whole(1);
+  whole.time(0, [&] {
+    for (int i = 0; i < frames; ++i) static_cast<void>(tracer.render(snapshot, {}, out));
+  });
+  std::printf("%.3f CPU-ms a frame\n", whole.least_s(0) / frames * 1e3);
 }
 
 void compare(const char* name, const Mesh& mesh, const std::vector<Material>& materials,
@@ -187,11 +122,8 @@ void compare(const char* name, const Mesh& mesh, const std::vector<Material>& ma
   spec.grid.beyond_frame_px = 16;
   const double range_m = 2.0 * target->bounding_radius_m / (pixels_across * spec.camera.ifov_rad());
   const Snapshot snapshot = view_of(range_m);
-  Kinds kinds;
-  {
-    // The image in the middle of the frame, as the camera looks at the origin.
-    kinds = rays_of(*target, snapshot, spec.camera);
-  }
+  // The image in the middle of the frame, as the camera looks at the origin.
+  const ImageRays kinds = rays_of(*target, snapshot, spec.camera, kSamples);
   std::printf("\n%s: %zu triangles, %.0f px across, %d samples a pixel, 1 bounce\n", name,
               mesh.triangles.size(), pixels_across, kSamples);
   const BareEmbree bare(mesh);
