@@ -12,7 +12,7 @@ packages=(
   nlohmann-json3-dev libasio-dev libssl-dev libusb-1.0-0-dev
   # tests, benchmarks, pictures
   libgtest-dev libumockdev-dev umockdev libbenchmark-dev python3 python3-matplotlib python3-numpy
-  python3-erfa python3-sgp4
+  python3-erfa python3-sgp4 valgrind
 )
 # The slow checks of tools/test.sh --full only.
 if [[ "${1:-}" == "--full" ]]; then packages+=(clang-format clang-tidy); fi
