@@ -3,9 +3,9 @@
 
     tools/bench/instructions.py [--update] [build/release/hot_loops]
 
-Ends with 1 where a stage takes over 5 % more than tests/data/instructions.csv says, and with 77
-where nothing can be said: no valgrind, or another compiler, library or processor than the
-reference's. --update writes the reference anew."""
+Ends with 1 where a stage takes over 5 % more than tests/data/instructions.csv says or the loops fail,
+and with 77 where nothing can be said: no valgrind, or another compiler, library or processor than
+the reference's. --update writes the reference anew."""
 
 import os
 import pathlib
@@ -24,6 +24,10 @@ FLAGS = ["sse4_2", "avx", "f16c", "fma", "avx2", "bmi1", "bmi2", "abm", "erms"]
 
 
 class CannotCount(Exception):
+    pass
+
+
+class Broken(Exception):
     pass
 
 
@@ -66,7 +70,7 @@ def count(program):
              f"--callgrind-out-file={folder}/out", program],
             capture_output=True, text=True, preexec_fn=on_one_core, check=False)
         if run.returncode != 0:
-            raise CannotCount(f"under valgrind it ends with {run.returncode}:\n{run.stderr[-2000:]}")
+            raise Broken(f"{program} fails: under valgrind it ends with {run.returncode}:\n{run.stderr[-2000:]}")
         stages = {}
         for dump in sorted(pathlib.Path(folder).iterdir()):
             text = dump.read_text(encoding="utf-8")
@@ -79,12 +83,16 @@ def count(program):
 
 def read_reference():
     machine, stages = {}, {}
+    if not REFERENCE.exists():
+        raise Broken(f"{REFERENCE} is missing: --update writes it")
     for line in REFERENCE.read_text(encoding="utf-8").splitlines():
         if line.startswith("# ") and ": " in line:
             key, value = line[2:].split(": ", 1)
             machine[key] = value
         elif "," in line and not line.startswith(("#", "stage,")):
-            stage, instructions = line.split(",")
+            stage, _, instructions = line.partition(",")
+            if not (instructions.isdigit() and int(instructions) > 0):
+                raise Broken(f"{REFERENCE}: expected stage,instructions, found {line!r}")
             stages[stage] = int(instructions)
     return machine, stages
 
@@ -101,7 +109,7 @@ def compare(reference, found):
     good = reference.keys() == found.keys()
     if not good:
         print(f"the stages are {', '.join(found)}; the reference has {', '.join(reference)}")
-    for stage in reference.keys() & found.keys():
+    for stage in (s for s in reference if s in found):
         ratio = found[stage] / reference[stage]
         note = ""
         if ratio > 1 + TOLERANCE:
@@ -128,6 +136,9 @@ def main(arguments):
     except CannotCount as error:
         print(f"skipped: {error}")
         return SKIPPED
+    except Broken as error:
+        print(error)
+        return 1
     if update:
         write_reference(machine, found)
         return 0
