@@ -60,6 +60,21 @@ class Arithmetic(unittest.TestCase):
         self.assertEqual(list(found), ["a"])
         self.assertEqual(found["a"]["ratio"], 2.0)
 
+    def test_whatever_runs_first_goes_second_in_the_next_pair(self):
+        order = []
+        pairs = compare.in_turn(lambda: order.append("a") or "A", lambda: order.append("b") or "B", 3)
+        self.assertEqual("".join(order), "abbaab")
+        self.assertEqual(pairs, [("A", "B")] * 3)
+
+    def test_only_what_is_slower_for_sure_and_by_more_breaks_a_limit(self):
+        noise = [0.97, 0.99, 1.02, 1.01, 0.98, 1.03, 1.0, 0.99, 1.01]
+        found = {"twice": compare.verdict([2.0 * x for x in noise]),
+                 "a tenth": compare.verdict([1.1 * x for x in noise]),
+                 "half": compare.verdict([0.5 * x for x in noise]),
+                 "wild": compare.verdict([0.4, 0.5, 0.6, 1.5, 1.6, 1.7, 1.8, 1.9, 2.0])}
+        self.assertEqual(compare.broken_by(found, 1.2), ["twice"])
+        self.assertEqual(compare.broken_by(found, 1.0), ["twice", "a tenth"])
+
 
 class WrongInput(unittest.TestCase):
     def told(self, *words):
@@ -71,6 +86,12 @@ class WrongInput(unittest.TestCase):
     @unittest.skipIf(shutil.which("git") is None, "no git here")
     def test_is_told_in_one_line(self):
         self.assertEqual(self.told("HEAD", ".", "--pairs", "0"), "compare: --pairs must be at least 1, got 0\n")
+        self.assertEqual(self.told("HEAD", ".", "--pairs", "5", "--fail-above", "1.1"),
+                         "compare: --fail-above needs at least 6 pairs, got 5\n")
+        self.assertEqual(self.told("HEAD", ".", "--fail-above", "nan"),
+                         "compare: --fail-above must be a ratio of at least 1, got nan\n")
+        self.assertEqual(self.told("HEAD", ".", "--json", "/no/such/folder/x"),
+                         "compare: --json /no/such/folder/x: there is no such folder\n")
         self.assertEqual(self.told(".", "."), "compare: both are working tree\n")
         self.assertEqual(self.told("--", "--all", "."), 'compare: "--all" is no commit of this repository\n')
 
