@@ -29,8 +29,8 @@ class PacketIntake {
 
     [[nodiscard]] bool good() const noexcept { return end == PortCount::kPassedOn; }
   };
-  /// Counts the packet, and why it is refused. A good one is still to be given to deliver() or
-  /// refuse().
+  /// Counts why it is refused. A good one is counted by deliver() or refuse(), one of which it is
+  /// still to be given to.
   [[nodiscard]] Verdict check(std::span<const std::byte> packet) noexcept;
   /// The answer to a ping; nothing for all else, which goes to the loop.
   [[nodiscard]] std::optional<TelemetryPacket> deliver(Command command,

@@ -195,6 +195,18 @@ TEST(CommandPort, APortThatIsTakenIsComplainedOf) {
             "command_port.tcp_port cannot be had on 127.0.0.1: Address already in use");
 }
 
+TEST(CommandPort, AnyLookAtTheCountsHasAsManyPacketsAsEnds) {
+  hil::PortCounters counters;
+  std::uint64_t ends = 0;
+  for (std::size_t end = 0; end < hil::kPacketEnds; ++end) {
+    counters.add(static_cast<PortCount>(end), end + 1);
+    ends += end + 1;
+    EXPECT_EQ(counters.now()[PortCount::kPackets], ends);
+  }
+  counters.add(PortCount::kConnections);  // is no packet
+  EXPECT_EQ(counters.now()[PortCount::kPackets], ends);
+}
+
 TEST(CommandPort, WithAKeyOnlyFreshSignedPacketsCount) {
   const test_support::TempFile file("port_key", "00112233445566778899aabbccddeeff");
   const hil::PacketKey key = hil::PacketKey::from_file(file.path(), "test");

@@ -55,7 +55,8 @@ class Arithmetic(unittest.TestCase):
         self.assertEqual(compare.times_of(report), {"a": 2e6, "b": 3.0})
 
     def test_only_what_both_have_is_compared_pair_by_pair(self):
-        pairs = [({"a": 1.0, "gone": 1.0}, {"a": 2.0, "new": 1.0}), ({"a": 10.0, "gone": 1.0}, {"a": 20.0, "new": 1.0})]
+        pairs = [({"a": 1.0, "gone": 1.0}, {"a": 2.0, "new": 1.0}),
+                 ({"a": 10.0, "gone": 1.0}, {"a": 20.0, "new": 1.0})]
         found = compare.compare(pairs)
         self.assertEqual(list(found), ["a"])
         self.assertEqual(found["a"]["ratio"], 2.0)
@@ -78,14 +79,16 @@ class Arithmetic(unittest.TestCase):
 
 class WrongInput(unittest.TestCase):
     def told(self, *words):
-        done = subprocess.run([sys.executable, "-B", str(PROGRAM), *words], text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        done = subprocess.run([sys.executable, "-B", str(PROGRAM), *words], text=True,
+                              capture_output=True, check=False)
         self.assertEqual(done.returncode, 2)
         self.assertEqual(done.stdout, "")
         return done.stderr
 
     @unittest.skipIf(shutil.which("git") is None, "no git here")
     def test_is_told_in_one_line(self):
-        self.assertEqual(self.told("HEAD", ".", "--pairs", "0"), "compare: --pairs must be at least 1, got 0\n")
+        self.assertEqual(self.told("HEAD", ".", "--pairs", "0"),
+                         "compare: --pairs must be at least 1, got 0\n")
         self.assertEqual(self.told("HEAD", ".", "--pairs", "5", "--fail-above", "1.1"),
                          "compare: --fail-above needs at least 6 pairs, got 5\n")
         self.assertEqual(self.told("HEAD", ".", "--fail-above", "nan"),

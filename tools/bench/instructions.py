@@ -34,12 +34,16 @@ class Broken(Exception):
 def output_of(*command):
     try:
         return subprocess.run(command, check=True, capture_output=True, text=True).stdout
-    except (OSError, subprocess.CalledProcessError) as error:
+    except OSError as error:
         raise CannotCount(f"{command[0]} does not run: {error}") from error
+    except subprocess.CalledProcessError as error:
+        raise Broken(f"{command[0]} fails: {error}") from error
 
 
 def machine_of(program):
     """What the counts depend on besides the code."""
+    if not os.access(program, os.X_OK):
+        raise Broken(f"{program} is no program: build it")
     cpu = pathlib.Path("/proc/cpuinfo").read_text(encoding="utf-8")
     has = set(re.findall(r"^flags\s*:(.*)$", cpu, re.M)[0].split()) if "flags" in cpu else set()
     vendor = re.search(r"^vendor_id\s*:\s*(\S+)", cpu, re.M)
@@ -70,7 +74,8 @@ def count(program):
              f"--callgrind-out-file={folder}/out", program],
             capture_output=True, text=True, preexec_fn=on_one_core, check=False)
         if run.returncode != 0:
-            raise Broken(f"{program} fails: under valgrind it ends with {run.returncode}:\n{run.stderr[-2000:]}")
+            raise Broken(f"{program} fails: under valgrind it ends with {run.returncode}:\n"
+                         f"{run.stderr[-2000:]}")
         stages = {}
         for dump in sorted(pathlib.Path(folder).iterdir()):
             text = dump.read_text(encoding="utf-8")
