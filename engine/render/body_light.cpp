@@ -16,6 +16,10 @@ constexpr int kPatchesAShare = 64;
 // Of the target's radius: 2 px of a target of 100 px.
 constexpr double kCubesARadius = 30.0;
 constexpr double kDirectionsARadian = 125.0;
+// Of a lamp's light, in which it is worked out anew; and by how much what is shown may be off.
+constexpr std::size_t kFramesToRenew = 32;
+constexpr float kMostOff_rad = 50e-3F;
+constexpr double kCameraTurned_rad = 1.0 * kDegree;
 // By the cosine the mean direction is 48 deg off the normal.
 constexpr double kMeanCosine = 2.0 / 3.0;
 
@@ -34,23 +38,26 @@ BodyLight::BodyLight(const TracedTarget& target, int bounces, WorkerPool& pool)
   for (std::uint32_t m = 0; m < target.mesh.material_names.size(); ++m)
     binned_.emplace_back(target.facets.brdf(m));
   const std::size_t n = patches_.size();
-  for (Kept& kept : lamps_) {
-    kept.lit_share.resize(n);
-    kept.leaving.resize(n);
-    kept.bounced.resize(n);
-    kept.arriving.resize(n);
+  for (std::size_t k = 0; k < kLamps; ++k) {
+    for (Kept* kept : {&lamps_[k], &making_[k].kept}) {
+      kept->lit_share.resize(n);
+      kept->leaving.resize(n);
+      kept->bounced.resize(n);
+      kept->arriving.resize(n);
+    }
+    making_[k].sent.resize(n);
+    making_[k].next.resize(n);
+    to_camera_[k].resize(n);
   }
-  for (std::vector<float>* v : {&sent_, &next_, &to_camera_[0], &to_camera_[1], &leaving_})
-    v->resize(std::max<std::size_t>(n, 1));
 }
 
 template <class Work>
-void BodyLight::each_patch(WorkerPool& pool, const Work& work) const noexcept {
-  const std::size_t n = patches_.size();
-  const int shares = static_cast<int>((n + kPatchesAShare - 1) / kPatchesAShare);
+void BodyLight::each_patch(std::size_t first, std::size_t end, WorkerPool& pool,
+                           const Work& work) const noexcept {
+  const int shares = static_cast<int>((end - first + kPatchesAShare - 1) / kPatchesAShare);
   pool.rows(0, shares, [&](int share) {
-    const std::size_t first = static_cast<std::size_t>(share) * kPatchesAShare;
-    for (std::size_t p = first; p < std::min(n, first + kPatchesAShare); ++p) work(p);
+    const std::size_t from = first + static_cast<std::size_t>(share) * kPatchesAShare;
+    for (std::size_t p = from; p < std::min(end, from + kPatchesAShare); ++p) work(p);
   });
 }
 
@@ -80,14 +87,15 @@ void BodyLight::ask(Kept& kept, std::size_t first, std::size_t end) const noexce
   if (lanes > 0) send();
 }
 
-/// What sent_ brings to a patch.
-void BodyLight::gather(std::size_t patch, HemisphereBins::Values& arriving) const noexcept {
+/// What all that is sent brings to a patch.
+void BodyLight::gather(const std::vector<float>& sent, std::size_t patch,
+                       HemisphereBins::Values& arriving) const noexcept {
   const auto seen = patches_.seen_from(patch);
   for (std::size_t bin = 0; bin < HemisphereBins::kBins; ++bin) {
     float sum = 0.0F;
     for (std::size_t i = 0; i < SurfacePatches::kRaysABin; ++i) {
       const std::uint32_t other = seen[bin * SurfacePatches::kRaysABin + i];
-      if (other < SurfacePatches::kSky) sum += sent_[other];
+      if (other < SurfacePatches::kSky) sum += sent[other];
     }
     arriving[bin] += sum / SurfacePatches::kRaysABin;
   }
@@ -111,74 +119,113 @@ float BodyLight::sent_on(std::size_t patch, const EarthLight& cap) const noexcep
   return static_cast<float>(albedo * sum / static_cast<double>(SurfacePatches::kRays));
 }
 
-void BodyLight::renew(Kept& kept, const Lamp& lamp, const EarthLight& cap,
-                      WorkerPool& pool) noexcept {
-  kept.toward = rounded(lamp.toward.unit);
-  const std::size_t n = patches_.size();
-  const int shares = static_cast<int>((n + kPatchesAShare - 1) / kPatchesAShare);
+/// What patches send on of the light that comes to them straight from the lamp.
+void BodyLight::begin_with(Making& making, std::size_t first, std::size_t end, const Lamp& light,
+                           const EarthLight& cap, WorkerPool& pool) const noexcept {
+  Kept& kept = making.kept;
   if (cap.dark()) {
+    const int shares = static_cast<int>((end - first + kPatchesAShare - 1) / kPatchesAShare);
     pool.rows(0, shares, [&](int share) {
-      const std::size_t first = static_cast<std::size_t>(share) * kPatchesAShare;
-      ask(kept, first, std::min(n, first + kPatchesAShare));
+      const std::size_t from = first + static_cast<std::size_t>(share) * kPatchesAShare;
+      ask(kept, from, std::min(end, from + kPatchesAShare));
     });
   }
-  each_patch(pool, [&](std::size_t p) {
+  each_patch(first, end, pool, [&](std::size_t p) {
     const SurfacePatches::Patch& patch = patches_.patch(p);
     if (cap.dark()) {
       const double c = static_cast<double>(patch.normal.dot(kept.toward));
       const double albedo = c > 0.0 ? target_.facets.brdf(patch.material).albedo(c) : 0.0;
-      sent_[p] = static_cast<float>(c * albedo / kPi) * kept.lit_share[p];
+      making.sent[p] = static_cast<float>(c * albedo / kPi) * kept.lit_share[p];
     } else {
-      sent_[p] = sent_on(p, cap) / static_cast<float>(lamp.irradiance_w_m2);
+      making.sent[p] = sent_on(p, cap) / static_cast<float>(light.irradiance_w_m2);
     }
-    kept.leaving[p] = sent_[p];
+    kept.leaving[p] = making.sent[p];
     kept.bounced[p] = 0.0F;
     kept.arriving[p].fill(0.0F);
   });
-  for (int bounce = 1; bounce <= bounces_; ++bounce) {
-    each_patch(pool, [&](std::size_t p) {
-      HemisphereBins::Values now{};
-      gather(p, now);
-      float sum = 0.0F;
-      for (std::size_t bin = 0; bin < now.size(); ++bin) {
-        kept.arriving[p][bin] += now[bin];
-        sum += now[bin];
-      }
-      const double albedo = target_.facets.brdf(patches_.patch(p).material).albedo(kMeanCosine);
-      next_[p] = static_cast<float>(albedo) * sum / HemisphereBins::kBins;
-      kept.leaving[p] += next_[p];
-      if (bounce < bounces_) kept.bounced[p] += next_[p];
-    });
-    std::swap(sent_, next_);
-  }
 }
 
-void BodyLight::light_up(const Snapshot& snapshot, WorkerPool& pool) noexcept {
-  const auto lamps = lamps_of(snapshot);
-  std::array<float, kLamps> irradiance{};
-  for (std::size_t k = 0; k < kLamps; ++k) {
-    irradiance[k] = static_cast<float>(lamps[k]->irradiance_w_m2);
-    // Not a number either.
-    if (!(irradiance[k] > 0.0F)) irradiance[k] = 0.0F;
-    if (irradiance[k] == 0.0F) continue;
-    if (rounded(lamps[k]->toward.unit) != lamps_[k].toward)
-      renew(lamps_[k], *lamps[k], k == 1 ? snapshot.earth : kNoCap, pool);
-  }
-  each_patch(pool, [&](std::size_t p) {
-    const SurfacePatches::Patch& patch = patches_.patch(p);
-    leaving_[p] = 0.0F;
-    for (std::size_t k = 0; k < kLamps; ++k)
-      if (irradiance[k] > 0.0F) leaving_[p] += irradiance[k] * lamps_[k].leaving[p];
-    const Vector3f to_camera =
-        (snapshot.camera.m - patch.points[0].place.cast<double>()).normalized().cast<float>();
-    const Vector3f out = patch.axes * to_camera;
-    for (std::size_t k = 0; k < kLamps; ++k) {
-      to_camera_[k][p] = 0.0F;
-      if (irradiance[k] > 0.0F && out.z() > 0.0F)
-        to_camera_[k][p] =
-            irradiance[k] * binned_[patch.material].reflected(lamps_[k].arriving[p], out);
+void BodyLight::bounce(Making& making, std::size_t first, std::size_t end, bool last,
+                       WorkerPool& pool) const noexcept {
+  Kept& kept = making.kept;
+  each_patch(first, end, pool, [&](std::size_t p) {
+    HemisphereBins::Values now{};
+    gather(making.sent, p, now);
+    float sum = 0.0F;
+    for (std::size_t bin = 0; bin < now.size(); ++bin) {
+      kept.arriving[p][bin] += now[bin];
+      sum += now[bin];
     }
+    const double albedo = target_.facets.brdf(patches_.patch(p).material).albedo(kMeanCosine);
+    making.next[p] = static_cast<float>(albedo) * sum / HemisphereBins::kBins;
+    kept.leaving[p] += making.next[p];
+    if (!last) kept.bounced[p] += making.next[p];
   });
+}
+
+bool BodyLight::renew(std::size_t lamp, const Lamp& light, const EarthLight& cap, bool at_once,
+                      WorkerPool& pool) noexcept {
+  const Vector3f toward = rounded(light.toward.unit);
+  Making& making = making_[lamp];
+  // A direction that is no number is off, too.
+  const auto off = [&](const Vector3f& v) { return !((v - toward).norm() < kMostOff_rad); };
+  const bool all = (at_once && toward != lamps_[lamp].toward) || off(lamps_[lamp].toward);
+  if (!making.begun || (all && making.kept.toward != toward)) {
+    if (toward == lamps_[lamp].toward) return false;
+    making.begun = true;
+    making.done = 0;
+    making.kept.toward = toward;
+  }
+  const std::size_t n = patches_.size();
+  const std::size_t work = work_of_all();
+  std::size_t left = all ? work : work / kFramesToRenew + 1;
+  while (left > 0 && making.done < work) {
+    const std::size_t stage = making.done / n;
+    const std::size_t first = making.done % n;
+    const std::size_t end = std::min(n, first + left);
+    if (stage == 0) {
+      begin_with(making, first, end, light, cap, pool);
+    } else {
+      bounce(making, first, end, stage == static_cast<std::size_t>(bounces_), pool);
+      if (end == n) std::swap(making.sent, making.next);
+    }
+    left -= end - first;
+    making.done += end - first;
+  }
+  if (making.done < work) return false;
+  std::swap(lamps_[lamp], making.kept);
+  making.begun = false;
+  return true;
+}
+
+/// For 1 W/m^2.
+void BodyLight::send_to_camera(std::size_t lamp, WorkerPool& pool) noexcept {
+  each_patch(0, patches_.size(), pool, [&](std::size_t p) {
+    const SurfacePatches::Patch& patch = patches_.patch(p);
+    const Vector3f to_camera =
+        (camera_m_ - patch.points[0].place.cast<double>()).normalized().cast<float>();
+    const Vector3f out = patch.axes * to_camera;
+    to_camera_[lamp][p] =
+        out.z() > 0.0F ? binned_[patch.material].reflected(lamps_[lamp].arriving[p], out) : 0.0F;
+  });
+}
+
+void BodyLight::light_up(const Snapshot& snapshot, bool at_once, WorkerPool& pool) noexcept {
+  const auto lamps = lamps_of(snapshot);
+  const double to_target_m = snapshot.camera.m.norm() - target_.bounding_radius_m;
+  // Not a number either.
+  const bool turned = at_once || !((snapshot.camera.m - camera_m_).norm() <
+                                   kCameraTurned_rad * std::max(to_target_m, 0.0));
+  if (turned) camera_m_ = snapshot.camera.m;
+  for (std::size_t k = 0; k < kLamps; ++k) {
+    irradiance_w_m2_[k] = static_cast<float>(lamps[k]->irradiance_w_m2);
+    // Not a number either.
+    if (!(irradiance_w_m2_[k] > 0.0F)) irradiance_w_m2_[k] = 0.0F;
+    const bool on = irradiance_w_m2_[k] > 0.0F;
+    const bool renewed = on && renew(k, *lamps[k], k == 1 ? snapshot.earth : kNoCap, at_once, pool);
+    if (on && (renewed || turned || !current_[k])) send_to_camera(k, pool);
+    current_[k] = on || (current_[k] && !turned);
+  }
 }
 
 }  // namespace engine

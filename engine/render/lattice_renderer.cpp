@@ -148,7 +148,7 @@ void LatticeRenderer::light_up(const Snapshot& snapshot) noexcept {
     const bool asked = lamps_of(direct)[k]->irradiance_w_m2 > 0.0 || k == texel_lamp_;
     if (asked) lamp_views_[k].update(lamps[k]->toward.unit, pool_);
   }
-  if (bounces_ > 0) body_light_.light_up(snapshot, pool_);
+  if (bounces_ > 0) body_light_.light_up(snapshot, spec_.settled, pool_);
 }
 
 void LatticeRenderer::shade_row(const Snapshot& snapshot, Radiance& out, int index) noexcept {
@@ -294,7 +294,7 @@ void LatticeRenderer::add_kept(const Row& row, int column, const Tone& tone,
 
 float LatticeRenderer::kept_by_patch(std::size_t lamp, const SurfacePoint& place) const noexcept {
   const std::uint32_t patch = body_light_.patches().at(place);
-  return patch == SurfacePatches::kNone ? 0.0F : body_light_.to_camera(lamp)[patch];
+  return patch == SurfacePatches::kNone ? 0.0F : body_light_.to_camera(lamp, patch);
 }
 
 /// By patches; and the cap as if nothing stood before it.

@@ -139,7 +139,7 @@ TEST(BodyLight, WallIsLitByTheFloorAsItsFormFactorSays) {
   const TracedTarget target(corner(), {lambert_material("grey", 0.5)});
   WorkerPool pool(1);
   BodyLight light(target, 1, pool);
-  light.light_up(before_the_wall(), pool);
+  light.light_up(before_the_wall(), true, pool);
   const double leaving = 0.5 * 634.64 / kPi;
   for (const double h : {1.5, 3.0, 4.5}) {
     const SurfacePoint place{{0, 0, static_cast<float>(h)}, {1, 0, 0}, 0, 1e-5F};
@@ -148,9 +148,91 @@ TEST(BodyLight, WallIsLitByTheFloorAsItsFormFactorSays) {
     const double want =
         0.5 * leaving * wall_to_floor(static_cast<double>(light.patches().patch(patch).place.z()));
     // 512 fixed rays of which a fifth meet the floor: 9 %.
-    EXPECT_NEAR(static_cast<double>(light.to_camera(0)[patch]) / want, 1.0, 0.25) << h;
-    EXPECT_EQ(light.to_camera(1)[patch], 0.0F);
+    EXPECT_NEAR(static_cast<double>(light.to_camera(0, patch)) / want, 1.0, 0.25) << h;
+    EXPECT_EQ(light.to_camera(1, patch), 0.0F);
   }
+}
+
+/// All that goes to the camera of the Sun's light.
+std::vector<float> sunlight_of(const BodyLight& light) {
+  std::vector<float> all;
+  for (std::uint32_t p = 0; p < light.patches().size(); ++p) all.push_back(light.to_camera(0, p));
+  return all;
+}
+
+Snapshot with_sun_turned(double rad, const Vector3d& camera_m = {100e3, 0, 3}) {
+  Snapshot snapshot = before_the_wall(camera_m);
+  snapshot.sun.toward = direction_of<BodyFrame>({std::sin(rad), 0, std::cos(rad)});
+  return snapshot;
+}
+
+/// What a first frame makes of it.
+std::vector<float> sunlight_at_once(const TracedTarget& target, const Snapshot& snapshot,
+                                    WorkerPool& pool) {
+  BodyLight light(target, 2, pool);
+  light.light_up(snapshot, false, pool);
+  return sunlight_of(light);
+}
+
+TEST(BodyLight, ATurnedLampIsWorkedOutInSharesAndComesToTheSame) {
+  const TracedTarget target(corner(), {lambert_material("grey", 0.5)});
+  WorkerPool pool(2);
+  const std::vector<float> first = sunlight_at_once(target, with_sun_turned(0.0), pool);
+  const std::vector<float> last = sunlight_at_once(target, with_sun_turned(0.02), pool);
+  ASSERT_NE(first, last);
+  BodyLight light(target, 2, pool);
+  light.light_up(with_sun_turned(0.0), false, pool);
+  for (int frame = 1; frame < 32; ++frame) {
+    light.light_up(with_sun_turned(0.02), false, pool);
+    ASSERT_EQ(sunlight_of(light), first) << frame;
+  }
+  light.light_up(with_sun_turned(0.02), false, pool);
+  EXPECT_EQ(sunlight_of(light), last);
+}
+
+TEST(BodyLight, ALampThatTurnsFasterThanTheSharesIsWorkedOutAtOnce) {
+  const TracedTarget target(corner(), {lambert_material("grey", 0.5)});
+  WorkerPool pool(1);
+  BodyLight light(target, 2, pool);
+  light.light_up(with_sun_turned(0.0), false, pool);
+  // 8 mrad a frame: of what was begun nothing is ready when it is 50 mrad off.
+  for (int frame = 1; frame <= 7; ++frame)
+    light.light_up(with_sun_turned(0.008 * frame), false, pool);
+  EXPECT_EQ(sunlight_of(light), sunlight_at_once(target, with_sun_turned(0.056), pool));
+  // And whoever asks for all has all.
+  light.light_up(with_sun_turned(0.02), true, pool);
+  EXPECT_EQ(sunlight_of(light), sunlight_at_once(target, with_sun_turned(0.02), pool));
+}
+
+TEST(BodyLight, WhatGoesToTheCameraIsOfWhereItStandsWithinADegree) {
+  // Its lobe is wide enough for the bins to keep.
+  const TracedTarget target(corner(), {{"grey", FiveParameters{0.5, -8.0, 3.0, 0.05, 1.0}}});
+  WorkerPool pool(1);
+  const auto from = [](double deg) {
+    const double rad = deg * kDegree;
+    return before_the_wall({100e3 * std::cos(rad), 100e3 * std::sin(rad), 3});
+  };
+  BodyLight light(target, 2, pool);
+  light.light_up(from(0.0), false, pool);
+  const std::vector<float> first = sunlight_of(light);
+  light.light_up(from(0.9), false, pool);
+  EXPECT_EQ(sunlight_of(light), first);
+  light.light_up(from(1.1), false, pool);
+  EXPECT_NE(sunlight_of(light), first);
+  EXPECT_EQ(sunlight_of(light), sunlight_at_once(target, from(1.1), pool));
+  // A lamp that was off while the camera turned, too; and twice the light is twice as bright.
+  Snapshot dark = from(40.0);
+  dark.sun.irradiance_w_m2 = 0.0;
+  light.light_up(dark, false, pool);
+  EXPECT_EQ(sunlight_of(light), std::vector<float>(first.size(), 0.0F));
+  light.light_up(from(40.0), false, pool);
+  const std::vector<float> again = sunlight_of(light);
+  EXPECT_EQ(again, sunlight_at_once(target, from(40.0), pool));
+  Snapshot bright = from(40.0);
+  bright.sun.irradiance_w_m2 *= 2.0;
+  light.light_up(bright, false, pool);
+  for (std::size_t p = 0; p < again.size(); ++p)
+    ASSERT_EQ(sunlight_of(light)[p], 2.0F * again[p]) << p;
 }
 
 TEST(TexelGrid, EveryPlaceOfAFacetHasATexelRoundIt) {
@@ -258,7 +340,7 @@ struct Texels {
         light(target, body, 1),
         seen(snapshot) {
     view.update(snapshot.sun.toward.unit, pool);
-    body.light_up(snapshot, pool);
+    body.light_up(snapshot, true, pool);
     light.update(seen, {0, view}, kPx_m, true, pool);
   }
   double at(std::uint32_t facet, float second, float third) {
