@@ -163,15 +163,17 @@ void BodyLight::bounce(Making& making, std::size_t first, std::size_t end, bool 
   });
 }
 
-bool BodyLight::renew(std::size_t lamp, const Lamp& light, const EarthLight& cap, bool at_once,
+bool BodyLight::renew(std::size_t lamp, const Lamp& light, const EarthLight& cap, Renewal renewal,
                       WorkerPool& pool) noexcept {
   const Vector3f toward = rounded(light.toward.unit);
   Making& making = making_[lamp];
+  const Vector3f& shown = lamps_[lamp].toward;
   // A direction that is no number is off, too.
-  const auto off = [&](const Vector3f& v) { return !((v - toward).norm() < kMostOff_rad); };
-  const bool all = (at_once && toward != lamps_[lamp].toward) || off(lamps_[lamp].toward);
+  const bool off = !((shown - toward).norm() < kMostOff_rad);
+  const bool all = shown.isZero() || (renewal == Renewal::kAtOnce && toward != shown) ||
+                   (renewal == Renewal::kAsNeeded && off);
   if (!making.begun || (all && making.kept.toward != toward)) {
-    if (toward == lamps_[lamp].toward) return false;
+    if (toward == shown) return false;
     making.begun = true;
     making.done = 0;
     making.kept.toward = toward;
@@ -210,19 +212,20 @@ void BodyLight::send_to_camera(std::size_t lamp, WorkerPool& pool) noexcept {
   });
 }
 
-void BodyLight::light_up(const Snapshot& snapshot, bool at_once, WorkerPool& pool) noexcept {
+void BodyLight::light_up(const Snapshot& snapshot, Renewal renewal, WorkerPool& pool) noexcept {
   const auto lamps = lamps_of(snapshot);
   const double to_target_m = snapshot.camera.m.norm() - target_.bounding_radius_m;
   // Not a number either.
-  const bool turned = at_once || !((snapshot.camera.m - camera_m_).norm() <
-                                   kCameraTurned_rad * std::max(to_target_m, 0.0));
+  const bool turned =
+      renewal == Renewal::kAtOnce ||
+      !((snapshot.camera.m - camera_m_).norm() < kCameraTurned_rad * std::max(to_target_m, 0.0));
   if (turned) camera_m_ = snapshot.camera.m;
   for (std::size_t k = 0; k < kLamps; ++k) {
     irradiance_w_m2_[k] = static_cast<float>(lamps[k]->irradiance_w_m2);
     // Not a number either.
     if (!(irradiance_w_m2_[k] > 0.0F)) irradiance_w_m2_[k] = 0.0F;
     const bool on = irradiance_w_m2_[k] > 0.0F;
-    const bool renewed = on && renew(k, *lamps[k], k == 1 ? snapshot.earth : kNoCap, at_once, pool);
+    const bool renewed = on && renew(k, *lamps[k], k == 1 ? snapshot.earth : kNoCap, renewal, pool);
     if (on && (renewed || turned || !current_[k])) send_to_camera(k, pool);
     current_[k] = on || (current_[k] && !turned);
   }

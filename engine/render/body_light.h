@@ -19,18 +19,23 @@ namespace engine {
 /// BouncedLight has it; towards the camera a patch reflects it by its BRDF.
 /// Lamps are taken from the nearest of directions 8 mrad apart. When that is another one, what a
 /// lamp does is worked out anew, a share in each of 32 frames; what was known is shown until then,
-/// unless it is off by 50 mrad. What goes to the camera is summed up anew when it has turned by
-/// 1 deg. So a frame depends on those before it, and on nothing else.
-/// The Earth's cap, where the view has it, shines on patches from where the sky is open.
-/// Leaves out what took more than `bounces` bounces, and changes finer than a patch: those are
-/// TexelLight's.
-/// Thread: loop. Loop-safe but for the constructor. The target outlives it.
+/// unless it is off by 50 mrad and there is time. What goes to the camera is summed up anew when it
+/// has turned by 1 deg. So a frame depends on those before it, and on nothing else. The Earth's
+/// cap, where the view has it, shines on patches from where the sky is open. Leaves out what took
+/// more than `bounces` bounces, and changes finer than a patch: those are TexelLight's. Thread:
+/// loop. Loop-safe but for the constructor. The target outlives it.
 class BodyLight {
  public:
   BodyLight(const TracedTarget& target, int bounces, WorkerPool& pool);
 
-  /// For the snapshot's lamps and camera. `at_once`: all of it, as if it were the first frame.
-  void light_up(const Snapshot& snapshot, bool at_once, WorkerPool& pool) noexcept;
+  /// How a lamp that has turned is worked out. The first frame of a lamp has all.
+  enum class Renewal : std::uint8_t {
+    kAtOnce,    ///< in this frame
+    kAsNeeded,  ///< in shares, and at once where what is shown is off by too much
+    kInShares   ///< whatever is shown: there is no time for more
+  };
+  /// For the snapshot's lamps and camera.
+  void light_up(const Snapshot& snapshot, Renewal renewal, WorkerPool& pool) noexcept;
 
   /// What a patch sends to the camera of a lamp's light, in W/m^2/sr, but for what it mirrors;
   /// nothing of a lamp that is off.
@@ -85,7 +90,7 @@ class BodyLight {
   void each_patch(std::size_t first, std::size_t end, WorkerPool& pool,
                   const Work& work) const noexcept;
   /// True: there is a new Kept. `cap`: in place of the lamp, if not dark.
-  bool renew(std::size_t lamp, const Lamp& light, const EarthLight& cap, bool at_once,
+  bool renew(std::size_t lamp, const Lamp& light, const EarthLight& cap, Renewal renewal,
              WorkerPool& pool) noexcept;
   void begin_with(Making& making, std::size_t first, std::size_t end, const Lamp& light,
                   const EarthLight& cap, WorkerPool& pool) const noexcept;

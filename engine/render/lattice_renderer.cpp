@@ -98,8 +98,12 @@ RenderReport LatticeRenderer::render(const Snapshot& snapshot, Budget budget,
                 snapshot.earthshine_rung.albedo_error_e});
   texel_lamp_ = snapshot.sun.irradiance_w_m2 > 0.0 || cap_ ? 0 : 1;
   const double limit = budget.rho_mc > 0.0 ? budget.rho_mc : spec_.profile.rho_mc;
-  light_up(snapshot);
-  const bool as_it_stands = budget.shed >= Shed::kUpkeep && kept_lamp_ == texel_lamp_;
+  using Renewal = BodyLight::Renewal;
+  const bool hurried = budget.shed >= Shed::kUpkeep;
+  light_up(snapshot, spec_.settled ? Renewal::kAtOnce
+                     : hurried     ? Renewal::kInShares
+                                   : Renewal::kAsNeeded);
+  const bool as_it_stands = hurried && kept_lamp_ == texel_lamp_;
   if (bounces_ > 0 && !as_it_stands) {
     kept_lamp_ = texel_lamp_;
     const TexelLight::LampInView lamp{texel_lamp_, lamp_views_[texel_lamp_]};
@@ -138,7 +142,7 @@ RenderReport LatticeRenderer::render(const Snapshot& snapshot, Budget budget,
   return report;
 }
 
-void LatticeRenderer::light_up(const Snapshot& snapshot) noexcept {
+void LatticeRenderer::light_up(const Snapshot& snapshot, BodyLight::Renewal renewal) noexcept {
   BodyView direct = snapshot;
   if (cap_) direct.earthshine.irradiance_w_m2 = 0.0;
   target_->facets.light_up(direct, spec_.sun_disc == SunDisc::kOff ? 0.0 : kSunAngularRadius_rad);
@@ -148,7 +152,7 @@ void LatticeRenderer::light_up(const Snapshot& snapshot) noexcept {
     const bool asked = lamps_of(direct)[k]->irradiance_w_m2 > 0.0 || k == texel_lamp_;
     if (asked) lamp_views_[k].update(lamps[k]->toward.unit, pool_);
   }
-  if (bounces_ > 0) body_light_.light_up(snapshot, spec_.settled, pool_);
+  if (bounces_ > 0) body_light_.light_up(snapshot, renewal, pool_);
 }
 
 void LatticeRenderer::shade_row(const Snapshot& snapshot, Radiance& out, int index) noexcept {

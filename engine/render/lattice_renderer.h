@@ -93,7 +93,7 @@ class LatticeRenderer final : public Renderer {
   };
 
   [[nodiscard]] Bench& take_bench() noexcept;
-  void light_up(const Snapshot& snapshot) noexcept;
+  void light_up(const Snapshot& snapshot, BodyLight::Renewal renewal) noexcept;
   void shade_row(const Snapshot& snapshot, Radiance& out, int index) noexcept;
   void shade(const Row& row, int column, const Tone& tone) noexcept;
   void add_kept(const Row& row, int column, const Tone& tone, const SurfacePoint& middle,

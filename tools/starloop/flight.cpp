@@ -69,6 +69,7 @@ Flight::Result Flight::fly(const std::filesystem::path& folder, const DeviceMann
                        .camera = scored_camera(scenario),
                        .when_busy = spec.when_busy});
   hil::ClosedLoopPointing pointing = make_pointing(scenario, rig_, spec.start);
+  run_up(scenario, rig_, spec.start);
   pacing_.start();
   connections_.start(pacing_.clock(), manner);
   hil::FanOut recorders(recorder, truth);

@@ -194,6 +194,7 @@ int replay_log(const ReplayOptions& options) {
   Comparison comparison(log, writer.get());
   hil::NoCommands commands;
   hil::ClosedLoopPointing pointing = make_pointing(scenario, rig, spec.start);
+  run_up(scenario, rig, spec.start);
   hil::ManualClock clock(spec.start - spec.period);
   const auto loop = std::make_unique<hil::FrameLoop>(spec, clock, pointing, rig.generator(),
                                                      comparison, commands);

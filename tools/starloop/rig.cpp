@@ -180,6 +180,16 @@ hil::ScriptedPointing Rig::believed() const {
   return {*camera_, believed_target_, epoch_, path_, roll_, boresight_};
 }
 
+void run_up(const Scenario& scenario, Rig& rig, engine::SimTime start) {
+  constexpr int kFrames = 8;
+  if (scenario.run.clock != ClockMode::kRealtime || !scenario.run.sheds) return;
+  const engine::Shot shot = rig.predicted_shot(start, scenario.run.exposure);
+  engine::DnImage pixels;
+  pixels.resize(scenario.scene.camera.width_px, scenario.scene.camera.height_px);
+  engine::TruthMask mask;
+  for (int i = 0; i < kFrames; ++i) rig.generator().expose(shot, engine::Budget{}, pixels, mask);
+}
+
 hil::ClosedLoopPointing make_pointing(const Scenario& scenario, const Rig& rig,
                                       engine::SimTime start) {
   hil::PointingSpec spec;

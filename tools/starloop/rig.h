@@ -72,6 +72,11 @@ class Rig {
   std::unique_ptr<engine::SceneGenerator> generator_;
 };
 
+/// Frames that nobody gets, as of the first one's time: in real time what a renderer keeps on the
+/// body would else be begun when the first shutter opens, and the next ones be skipped for it. A
+/// replay has them too, for the frames after depend on them.
+void run_up(const Scenario& scenario, Rig& rig, engine::SimTime start);
+
 /// The camera that obeys, in a run that starts at `start`. The rig outlives it.
 [[nodiscard]] hil::ClosedLoopPointing make_pointing(const Scenario& scenario, const Rig& rig,
                                                     engine::SimTime start);

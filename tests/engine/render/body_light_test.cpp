@@ -139,7 +139,7 @@ TEST(BodyLight, WallIsLitByTheFloorAsItsFormFactorSays) {
   const TracedTarget target(corner(), {lambert_material("grey", 0.5)});
   WorkerPool pool(1);
   BodyLight light(target, 1, pool);
-  light.light_up(before_the_wall(), true, pool);
+  light.light_up(before_the_wall(), BodyLight::Renewal::kAtOnce, pool);
   const double leaving = 0.5 * 634.64 / kPi;
   for (const double h : {1.5, 3.0, 4.5}) {
     const SurfacePoint place{{0, 0, static_cast<float>(h)}, {1, 0, 0}, 0, 1e-5F};
@@ -170,7 +170,7 @@ Snapshot with_sun_turned(double rad, const Vector3d& camera_m = {100e3, 0, 3}) {
 std::vector<float> sunlight_at_once(const TracedTarget& target, const Snapshot& snapshot,
                                     WorkerPool& pool) {
   BodyLight light(target, 2, pool);
-  light.light_up(snapshot, false, pool);
+  light.light_up(snapshot, BodyLight::Renewal::kAsNeeded, pool);
   return sunlight_of(light);
 }
 
@@ -181,12 +181,12 @@ TEST(BodyLight, ATurnedLampIsWorkedOutInSharesAndComesToTheSame) {
   const std::vector<float> last = sunlight_at_once(target, with_sun_turned(0.02), pool);
   ASSERT_NE(first, last);
   BodyLight light(target, 2, pool);
-  light.light_up(with_sun_turned(0.0), false, pool);
+  light.light_up(with_sun_turned(0.0), BodyLight::Renewal::kAsNeeded, pool);
   for (int frame = 1; frame < 32; ++frame) {
-    light.light_up(with_sun_turned(0.02), false, pool);
+    light.light_up(with_sun_turned(0.02), BodyLight::Renewal::kAsNeeded, pool);
     ASSERT_EQ(sunlight_of(light), first) << frame;
   }
-  light.light_up(with_sun_turned(0.02), false, pool);
+  light.light_up(with_sun_turned(0.02), BodyLight::Renewal::kAsNeeded, pool);
   EXPECT_EQ(sunlight_of(light), last);
 }
 
@@ -194,14 +194,30 @@ TEST(BodyLight, ALampThatTurnsFasterThanTheSharesIsWorkedOutAtOnce) {
   const TracedTarget target(corner(), {lambert_material("grey", 0.5)});
   WorkerPool pool(1);
   BodyLight light(target, 2, pool);
-  light.light_up(with_sun_turned(0.0), false, pool);
+  light.light_up(with_sun_turned(0.0), BodyLight::Renewal::kAsNeeded, pool);
   // 8 mrad a frame: of what was begun nothing is ready when it is 50 mrad off.
   for (int frame = 1; frame <= 7; ++frame)
-    light.light_up(with_sun_turned(0.008 * frame), false, pool);
+    light.light_up(with_sun_turned(0.008 * frame), BodyLight::Renewal::kAsNeeded, pool);
   EXPECT_EQ(sunlight_of(light), sunlight_at_once(target, with_sun_turned(0.056), pool));
   // And whoever asks for all has all.
-  light.light_up(with_sun_turned(0.02), true, pool);
+  light.light_up(with_sun_turned(0.02), BodyLight::Renewal::kAtOnce, pool);
   EXPECT_EQ(sunlight_of(light), sunlight_at_once(target, with_sun_turned(0.02), pool));
+}
+
+TEST(BodyLight, WhoHasNoTimeGetsSharesHoweverFarTheLampHasTurned) {
+  const TracedTarget target(corner(), {lambert_material("grey", 0.5)});
+  WorkerPool pool(1);
+  const std::vector<float> last = sunlight_at_once(target, with_sun_turned(0.5), pool);
+  BodyLight light(target, 2, pool);
+  light.light_up(with_sun_turned(0.0), BodyLight::Renewal::kInShares, pool);
+  const std::vector<float> first = sunlight_of(light);
+  EXPECT_EQ(first, sunlight_at_once(target, with_sun_turned(0.0), pool));
+  for (int frame = 1; frame < 32; ++frame) {
+    light.light_up(with_sun_turned(0.5), BodyLight::Renewal::kInShares, pool);
+    ASSERT_EQ(sunlight_of(light), first) << frame;
+  }
+  light.light_up(with_sun_turned(0.5), BodyLight::Renewal::kInShares, pool);
+  EXPECT_EQ(sunlight_of(light), last);
 }
 
 TEST(BodyLight, WhatGoesToTheCameraIsOfWhereItStandsWithinADegree) {
@@ -213,24 +229,24 @@ TEST(BodyLight, WhatGoesToTheCameraIsOfWhereItStandsWithinADegree) {
     return before_the_wall({100e3 * std::cos(rad), 100e3 * std::sin(rad), 3});
   };
   BodyLight light(target, 2, pool);
-  light.light_up(from(0.0), false, pool);
+  light.light_up(from(0.0), BodyLight::Renewal::kAsNeeded, pool);
   const std::vector<float> first = sunlight_of(light);
-  light.light_up(from(0.9), false, pool);
+  light.light_up(from(0.9), BodyLight::Renewal::kAsNeeded, pool);
   EXPECT_EQ(sunlight_of(light), first);
-  light.light_up(from(1.1), false, pool);
+  light.light_up(from(1.1), BodyLight::Renewal::kAsNeeded, pool);
   EXPECT_NE(sunlight_of(light), first);
   EXPECT_EQ(sunlight_of(light), sunlight_at_once(target, from(1.1), pool));
   // A lamp that was off while the camera turned, too; and twice the light is twice as bright.
   Snapshot dark = from(40.0);
   dark.sun.irradiance_w_m2 = 0.0;
-  light.light_up(dark, false, pool);
+  light.light_up(dark, BodyLight::Renewal::kAsNeeded, pool);
   EXPECT_EQ(sunlight_of(light), std::vector<float>(first.size(), 0.0F));
-  light.light_up(from(40.0), false, pool);
+  light.light_up(from(40.0), BodyLight::Renewal::kAsNeeded, pool);
   const std::vector<float> again = sunlight_of(light);
   EXPECT_EQ(again, sunlight_at_once(target, from(40.0), pool));
   Snapshot bright = from(40.0);
   bright.sun.irradiance_w_m2 *= 2.0;
-  light.light_up(bright, false, pool);
+  light.light_up(bright, BodyLight::Renewal::kAsNeeded, pool);
   for (std::size_t p = 0; p < again.size(); ++p)
     ASSERT_EQ(sunlight_of(light)[p], 2.0F * again[p]) << p;
 }
@@ -340,7 +356,7 @@ struct Texels {
         light(target, body, 1),
         seen(snapshot) {
     view.update(snapshot.sun.toward.unit, pool);
-    body.light_up(snapshot, true, pool);
+    body.light_up(snapshot, BodyLight::Renewal::kAtOnce, pool);
     light.update(seen, {0, view}, kPx_m, true, pool);
   }
   double at(std::uint32_t facet, float second, float third) {
