@@ -42,7 +42,7 @@ class OverloadGovernor {
   /// Of the frame that a step more came after; 0: it is known what that brings.
   double before_s_ = 0;
   /// Time of a frame at a step over that at the step before.
-  std::array<double, engine::kSheds> share_{1, 1, 1, 1};
+  std::array<double, engine::kSheds> share_{1, 1, 1, 1, 1};
 };
 
 }  // namespace hil

@@ -86,44 +86,60 @@ void LampView::draw(int band) noexcept {
               std::span(nearness_).subspan(first, size));
 }
 
-Lit LampView::places(std::uint32_t facet, const Eigen::Vector2f& low,
-                     const Eigen::Vector2f& high) const noexcept {
+LampView::Steps LampView::count(std::uint32_t facet, const Eigen::Vector2f& low,
+                                const Eigen::Vector2f& high, int beyond,
+                                bool mixed_ends) const noexcept {
   static_assert(kColumns == kSide);
   // With all points round the rectangle; not off the map, nor a number that is none.
   const float end = kSide - 2.0F;
-  if (!(low.x() >= 1.0F && low.y() >= 1.0F && high.x() < end && high.y() < end))
-    return Lit::kUnknown;
-  const int left = static_cast<int>(low.x()) - 1;
-  const int top = static_cast<int>(low.y()) - 1;
-  const int right = static_cast<int>(high.x()) + 2;
-  const int bottom = static_cast<int>(high.y()) + 2;
-  if (right - left > kMostSteps || bottom - top > kMostSteps) return Lit::kUnknown;
+  if (!(low.x() >= 1.0F && low.y() >= 1.0F && high.x() < end && high.y() < end)) return {};
+  const int left = static_cast<int>(low.x()) - beyond;
+  const int top = static_cast<int>(low.y()) - beyond;
+  const int right = static_cast<int>(high.x()) + 1 + beyond;
+  const int bottom = static_cast<int>(high.y()) + 1 + beyond;
+  if (right - left > kMostSteps || bottom - top > kMostSteps) return {};
   const Plane& plane = planes_[facet];
   const float m_a_step = 2.0F * static_cast<float>(radius_m_) / kSide;
   const float margin =
       kAbove_steps * m_a_step + kAcross_steps * (std::abs(plane.per_x) + std::abs(plane.per_y));
   const float shades = kShades_steps * m_a_step;
   // No number for facets seen edge-on, and where the lamp's direction is none.
-  if (!(margin < std::numeric_limits<float>::infinity())) return Lit::kUnknown;
-  const int columns = right - left;
-  int above = 0;
-  int shading = 0;
-  int asked = 0;
+  if (!(margin < std::numeric_limits<float>::infinity())) return {};
+  Steps steps;
   for (int j = top; j < bottom; ++j) {
     const float* nearness = &nearness_[static_cast<std::size_t>(j) * kSide];
     const float row = plane.at_zero + margin + plane.per_y * static_cast<float>(j) +
                       plane.per_x * TriangleRaster::x_in_step(j);
     // Without a branch: in lanes.
+    int above = 0;
+    int shading = 0;
     for (int i = left; i < right; ++i) {
       const float height = row + plane.per_y * kYInStep[static_cast<std::size_t>(i)] +
                            plane.per_x * static_cast<float>(i);
       above += nearness[i] > height ? 1 : 0;
       shading += nearness[i] > height + shades ? 1 : 0;
     }
-    asked += columns;
-    if (above != 0 && shading != asked) return Lit::kUnknown;
+    steps.above += above;
+    steps.shading += shading;
+    steps.asked += right - left;
+    if (mixed_ends && steps.above != 0 && steps.shading != steps.asked) break;
   }
-  return above == 0 ? Lit::kYes : Lit::kNo;
+  return steps;
+}
+
+Lit LampView::places(std::uint32_t facet, const Eigen::Vector2f& low,
+                     const Eigen::Vector2f& high) const noexcept {
+  const Steps steps = count(facet, low, high, 1, true);
+  if (steps.asked == 0 || (steps.above != 0 && steps.shading != steps.asked)) return Lit::kUnknown;
+  return steps.above == 0 ? Lit::kYes : Lit::kNo;
+}
+
+float LampView::lit_share(std::uint32_t facet, const Eigen::Vector2f& low,
+                          const Eigen::Vector2f& high) const noexcept {
+  const Steps steps = count(facet, low, high, 0, false);
+  // What stands above a facet's plane by little may or may not shade it: by half.
+  const float dark = 0.5F * static_cast<float>(steps.above + steps.shading);
+  return 1.0F - dark / static_cast<float>(steps.asked);
 }
 
 }  // namespace engine

@@ -35,6 +35,10 @@ class LampView {
   /// Of the facet's places in a rectangle of the map. Unknown for one of many steps.
   [[nodiscard]] Lit places(std::uint32_t facet, const Eigen::Vector2f& low,
                            const Eigen::Vector2f& high) const noexcept;
+  /// The share of such a rectangle that the lamp reaches, by the map's steps in it alone: sooner
+  /// known than by rays, and as right as the map is fine. No number where that cannot be told.
+  [[nodiscard]] float lit_share(std::uint32_t facet, const Eigen::Vector2f& low,
+                                const Eigen::Vector2f& high) const noexcept;
 
  private:
   static constexpr unsigned kSide = 1024;
@@ -45,6 +49,18 @@ class LampView {
     float per_y = 0;
   };
 
+  /// Steps of the map round a rectangle, and of these those that stand above a facet's plane: at
+  /// all, and by so much that they cast a shadow.
+  struct Steps {
+    int asked = 0;  ///< 0: it cannot be told
+    int above = 0;
+    int shading = 0;
+  };
+  /// Of rows of which some stand above and not all cast a shadow no more are counted if
+  /// `mixed_ends`.
+  [[nodiscard]] Steps count(std::uint32_t facet, const Eigen::Vector2f& low,
+                            const Eigen::Vector2f& high, int beyond,
+                            bool mixed_ends) const noexcept;
   void draw(int band) noexcept;
   [[nodiscard]] Plane plane_of(std::uint32_t facet, const Eigen::Matrix3d& axes) const noexcept;
 

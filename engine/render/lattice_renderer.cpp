@@ -78,6 +78,7 @@ RenderReport LatticeRenderer::render(const Snapshot& snapshot, Budget budget,
   report.samples_per_pixel = view_.points_a_pixel() * view_.points_a_pixel();
   bounces_ = budget.shed >= Shed::kBounces ? 0 : spec_.bounces;
   report.bounces = bounces_;
+  shadows_by_map_ = budget.shed >= Shed::kShadows;
   report.visible_fraction = view_.footprint().visible_fraction();
   constexpr double kNotKnown = std::numeric_limits<double>::quiet_NaN();
   report.add({"method", "lattice", kNotKnown});
@@ -317,13 +318,17 @@ void LatticeRenderer::add_lamp(const Row& row, int column, const Tone& tone, std
   const Vector2f corner = view.on_map(pixel.corner);
   const Vector2f across = view.on_map(pixel.corner + pixel.across) - corner;
   const Vector2f down = view.on_map(pixel.corner + pixel.down) - corner;
-  // A parallelogram from `from`, `size` pixels wide.
-  const auto ask_map = [&](const Vector2f& from, float size) {
+  // A parallelogram from `from`, `size` pixels wide: ask(low, high) of the box about it.
+  const auto of_box = [&](const Vector2f& from, float size, const auto& ask) {
     const Vector2f b = from + size * across;
     const Vector2f c = from + size * down;
     const Vector2f d = b + size * down;
-    return view.places(tone.facet, from.cwiseMin(b).cwiseMin(c).cwiseMin(d),
-                       from.cwiseMax(b).cwiseMax(c).cwiseMax(d));
+    return ask(from.cwiseMin(b).cwiseMin(c).cwiseMin(d), from.cwiseMax(b).cwiseMax(c).cwiseMax(d));
+  };
+  const auto ask_map = [&](const Vector2f& from, float size) {
+    return of_box(from, size, [&](const Vector2f& low, const Vector2f& high) {
+      return view.places(tone.facet, low, high);
+    });
   };
   const Lit whole = ask_map(corner, 1.0F);
   if (whole == Lit::kNo) return;
@@ -334,10 +339,20 @@ void LatticeRenderer::add_lamp(const Row& row, int column, const Tone& tone, std
     const auto x = static_cast<int>(cell) % s;
     const auto y = static_cast<int>(cell) / s;
     Lit lit = whole;
-    if (lit == Lit::kUnknown)
-      lit = ask_map(corner + static_cast<float>(x) * cell_px * across +
-                        static_cast<float>(y) * cell_px * down,
-                    cell_px);
+    if (lit == Lit::kUnknown) {
+      const Vector2f from = corner + static_cast<float>(x) * cell_px * across +
+                            static_cast<float>(y) * cell_px * down;
+      if (shadows_by_map_) {
+        const float share = of_box(from, cell_px, [&](const Vector2f& low, const Vector2f& high) {
+          return view.lit_share(tone.facet, low, high);
+        });
+        if (!std::isnan(share)) {
+          light[cell] += share * direct;
+          continue;
+        }
+      }
+      lit = ask_map(from, cell_px);
+    }
     if (lit == Lit::kYes) light[cell] += direct;
     if (lit == Lit::kUnknown)
       row.bench.doubts.add({.lamp = lamp,

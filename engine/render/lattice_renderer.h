@@ -126,8 +126,9 @@ class LatticeRenderer final : public Renderer {
   std::array<Eigen::Vector3f, kLamps> toward_lamp_;
   std::size_t texel_lamp_ = 0;  ///< the brighter one
   int bounces_ = 0;
-  bool cap_ = false;       ///< the Earth's light is its cap's, kept by texels
-  float cells_alike_ = 1;  ///< so many see the same texel
+  bool shadows_by_map_ = false;  ///< no rays for them
+  bool cap_ = false;             ///< the Earth's light is its cap's, kept by texels
+  float cells_alike_ = 1;        ///< so many see the same texel
 };
 
 }  // namespace engine

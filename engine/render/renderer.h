@@ -67,13 +67,14 @@ enum class Shed : std::uint8_t {
   kNothing,
   kUpkeep,   ///< what is kept from frame to frame is shown as it stands: nothing of it is renewed
   kSamples,  ///< the coarsest lattice; of paths a quarter of the samples
-  kBounces   ///< light that bounces; of paths another three quarters of the samples
+  kBounces,  ///< light that bounces; of paths another three quarters of the samples
+  kShadows   ///< the lattice's rays: edges of shadows are as its maps of the lamps' views have them
 };
-inline constexpr int kSheds = 4;
-/// "nothing", "upkeep", "samples" and "bounces".
+inline constexpr int kSheds = 5;
+/// "nothing", "upkeep", "samples", "bounces" and "shadows".
 [[nodiscard]] constexpr std::string_view name_of(Shed shed) noexcept {
   constexpr std::array<std::string_view, kSheds> kNames = {"nothing", "upkeep", "samples",
-                                                           "bounces"};
+                                                           "bounces", "shadows"};
   return kNames[static_cast<std::size_t>(shed)];
 }
 

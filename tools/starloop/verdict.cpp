@@ -181,12 +181,12 @@ void print_summary(const Scenario& s, const RunLog& log, const Verdict& v, bool 
         "{} frames late or after skipped ones: {} our own work, {} the machine, {} unknown",
         delayed, of_cause(l, hil::LateCause::kOwnWork), of_cause(l, hil::LateCause::kMachine),
         of_cause(l, hil::LateCause::kUnknown));
-  if (const auto [whole, upkeep, samples, bounces] = l.by_shed; upkeep + samples + bounces > 0)
+  if (const auto [whole, upkeep, samples, bounces, shadows] = l.by_shed;
+      upkeep + samples + bounces + shadows > 0)
     spdlog::info(
         "for want of time {} frames left out the upkeep of kept light, {} samples, too, {} "
-        "bounces, "
-        "too; {} were whole",
-        upkeep, samples, bounces, whole);
+        "bounces, too, {} rays for shadows, too; {} were whole",
+        upkeep, samples, bounces, shadows, whole);
   if (log.machine)
     spdlog::info("the machine's own stalls: p99.9 {:.2f} ms, worst {:.2f} ms",
                  seconds(log.machine->quantile(0.999)) * 1e3, seconds(log.machine->worst()) * 1e3);

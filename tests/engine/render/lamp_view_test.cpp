@@ -109,6 +109,28 @@ TEST(LampView, TellsOfTheTelescopeWhatRaysDo) {
   }
 }
 
+TEST(LampView, HalfOfARectangleOnAShadowsEdgeIsLit) {
+  // A plate of 2 m stands 1 m above a floor, the lamp straight above: its edge is at x = 1.
+  Mesh mesh;
+  add_plate(mesh, "grey", {-6, -6, 0}, {12, 0, 0}, {0, 12, 0});
+  add_plate(mesh, "grey", {-1, -1, 1}, {2, 0, 0}, {0, 2, 0});
+  LampView view(mesh);
+  WorkerPool pool(1);
+  view.update({0, 0, 1}, pool);
+  const auto share = [&](float x) {
+    // 10 cm wide: six steps of the map.
+    const Eigen::Vector2f a = view.on_map({x - 0.05F, 0.0F, 0.0F});
+    const Eigen::Vector2f b = view.on_map({x + 0.05F, 0.1F, 0.0F});
+    // Facet 0 and 1 are the floor's.
+    return view.lit_share(0, a.cwiseMin(b), a.cwiseMax(b));
+  };
+  EXPECT_EQ(share(2.0F), 1.0F);
+  EXPECT_EQ(share(0.5F), 0.0F);
+  EXPECT_NEAR(share(1.0F), 0.5F, 0.15F);
+  EXPECT_NEAR(share(0.975F), 0.25F, 0.15F);
+  EXPECT_TRUE(std::isnan(share(100.0F)));
+}
+
 /// A floor with tiles of 5 mm in a raster, 5 cm apart, as cells lie on a panel.
 Mesh tiles() {
   Mesh mesh;

@@ -441,6 +441,19 @@ TEST(LatticeRenderer, WithoutBouncesForWantOfTimeALightIsADirectOne) {
   EXPECT_EQ(all.report.samples_per_pixel, 36);
 }
 
+TEST(LatticeRenderer, WithoutRaysForWantOfTimeShadowsAreStillThere) {
+  for (const Vector3d& toward : {Vector3d(0.9, 0.5, 0.1), Vector3d(-0.1, 0.3, 0.95)}) {
+    const Snapshot snapshot = view_from(Vector3d(0.5, 0.4, 0.77).normalized() * kRange_m, toward);
+    Rig rig(spec_of(128, 1), telescope_mesh(), telescope_materials());
+    const double by_rays = sum_of(rig.render(snapshot, {.shed = Shed::kBounces}));
+    const std::uint64_t rays = rig.report.rays;
+    const double by_maps = sum_of(rig.render(snapshot, {.shed = Shed::kShadows}));
+    EXPECT_NEAR(by_maps / by_rays, 1.0, 0.03);
+    // Where the map cannot tell either, rays still do.
+    EXPECT_LT(rig.report.rays, rays / 10);
+  }
+}
+
 TEST(LatticeRenderer, WhatIsKeptIsShownAsItStandsForWantOfTimeAndTakenUpAgainAfterwards) {
   const Vector3d from = Vector3d(0.5, 0.4, 0.77).normalized() * kRange_m;
   const Snapshot snapshot = view_from(from, {0.9, 0.5, 0.1});
