@@ -65,7 +65,7 @@ struct SensorNoise {
 /// what a picture loses by it.
 enum class Shed : std::uint8_t {
   kNothing,
-  kUpkeep,   ///< what is kept from frame to frame is shown as it stands: nothing of it is renewed
+  kUpkeep,   ///< what is kept from frame to frame is shown as it stands, but for lamps' patches
   kSamples,  ///< the coarsest lattice; of paths a quarter of the samples
   kBounces,  ///< light that bounces; of paths another three quarters of the samples
   kShadows   ///< the lattice's rays: edges of shadows are as its maps of the lamps' views have them

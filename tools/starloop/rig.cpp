@@ -182,7 +182,10 @@ hil::ScriptedPointing Rig::believed() const {
 
 void run_up(const Scenario& scenario, Rig& rig, engine::SimTime start) {
   constexpr int kFrames = 8;
-  if (scenario.run.clock != ClockMode::kRealtime || !scenario.run.sheds) return;
+  // Frames with a deadline are paths', which keep nothing and would take all their samples here.
+  if (scenario.run.clock != ClockMode::kRealtime || !scenario.run.sheds ||
+      scenario.run.render_time > engine::Duration{})
+    return;
   const engine::Shot shot = rig.predicted_shot(start, scenario.run.exposure);
   engine::DnImage pixels;
   pixels.resize(scenario.scene.camera.width_px, scenario.scene.camera.height_px);
